@@ -150,8 +150,7 @@ fn a_model_with_knots_gives_what_they_say_along_a_path() {
         fs::read_to_string(folder.path().join("model.toml")).unwrap().replace("[0.0, 0.3]", "[0.3, 0.0]");
     fs::write(folder.path().join("falling.toml"), falling).unwrap();
     let said = tactus(folder.path(), &["simulate", "--model", "falling.toml", "--scene", "cylinder"]);
-    let error =
-        "falling.toml: effect[0]: hardening: knots.growth[1] must be not below the value before, 0.3, not 0";
+    let error = "falling.toml: effect[0]: hardening: knots.growth[1] must be at least 0.15, so that it times the place does not fall, not 0";
     assert!(said.code != Some(0) && said.err.contains(error), "{said:?}");
 }
 

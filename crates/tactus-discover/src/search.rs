@@ -29,6 +29,7 @@ mod rivals;
 mod scatter;
 mod score;
 mod tones;
+mod varying;
 mod wiring;
 
 pub(crate) use candidates::Candidate;

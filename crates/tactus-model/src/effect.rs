@@ -135,7 +135,7 @@ mod time_lag;
 struct AddingAnEffect;
 
 pub use definition::{Definition, Effect, EffectError, Make, Parameter, ParameterKind, PipelineStage};
-pub use knots::{CurveKind, FreeCurve, KNOTS_MAX, Knots, Values};
+pub use knots::{CurveKind, FreeCurve, KNOTS_MAX, Knots, Rises, Values};
 pub use stage::{BaseModel, Load, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, TipState};
 pub(crate) use table::Tabled;
 pub use table::{By, Table};

@@ -15,8 +15,9 @@
 use nalgebra::DMatrix;
 
 use super::elimination::Elimination;
+use super::knots::bounded;
 use super::parameters::Parameters;
-use super::problem::{Fitted, Free, Problem};
+use super::problem::{Fitted, Free, Problem, least_step};
 use super::scale::Scale;
 use super::sums::{Block, Kept, Segments, Total, add};
 use crate::data::DiscoverError;
@@ -44,6 +45,8 @@ impl Problem<'_> {
         }
         let own = self.own(&at.parameters);
         let priors = self.priors(&at.parameters);
+        let least: Vec<f64> =
+            self.free(&at.parameters).iter().map(|one| least_step(&at.parameters, *one)).collect();
         let count = own.len();
         let segments = Segments::of(self, &at.parameters);
         let total = self.sums(&at.parameters, &at.predicted, own, count, Kept::AllAndBlocks, &segments)?;
@@ -60,11 +63,13 @@ impl Problem<'_> {
                 fitted.reduced[(count, one)] += precision * centre;
                 fitted.whole[one] += precision;
             }
-            let steps: Vec<f64> = fitted.sweep(count).column(count).iter().copied().collect();
-            let element = fitted.fitted(&steps);
+            let (gram, right, squares) = fitted.equations();
+            let steps = bounded(&gram, &right, 0.0, &squares, &least);
+            let steps = steps.as_slice();
+            let element = fitted.fitted(steps);
             let blocks = total.blocks.iter().zip(&press).zip(&mut left);
             for ((block, _), left) in blocks.filter(|((_, press), _)| is_in(**press)) {
-                *left = left_of(block, &steps, |number| element(block.segment, number));
+                *left = left_of(block, steps, |number| element(block.segment, number));
             }
         }
         Ok(Some(left))

@@ -1,6 +1,7 @@
 //! Knots of free curves in a fit: where they lie, how they move, and steps that keep them within their class.
 //!
-//! The values of a curve that must not fall are fitted as their increments, each at least 0; other values each by itself. A step solves the
+//! The values of a curve that must not fall are fitted as their increments, each at least 0, or as those of value times place; other values
+//! each by itself. A step solves the
 //! damped normal equations under these bounds: what would leave its bound is held there, and what would rather return is let go.
 //!
 //! # Source
@@ -8,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use tactus_model::Registration;
-use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Table};
+use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Rises, Table};
 
 use super::parameters::Term;
 use super::problem::{Problem, solve};
@@ -34,7 +35,40 @@ struct Listed<'a> {
     /// The knot's number among them.
     at: usize,
     range: [f64; 2],
-    rises: bool,
+    rises: Rises,
+    /// The place of each; none where values are each by itself.
+    places: &'a [f64],
+}
+
+impl Listed<'_> {
+    /// The least value that the one before allows.
+    fn floor(&self) -> Option<f64> {
+        let before = self.at.checked_sub(1)?;
+        let places = [before, self.at].map(|place| self.places.get(place).copied());
+        self.rises.least([places[0]?, places[1]?], self.values[before])
+    }
+
+    /// By how much each value from the knot on moves with it.
+    fn moved(&self) -> Vec<f64> {
+        match self.rises {
+            Rises::No => vec![1.0],
+            Rises::Value => vec![1.0; self.values.len() - self.at],
+            Rises::ValueTimesPlace => {
+                let here = self.places[self.at];
+                self.places[self.at..].iter().map(|place| here / place).collect()
+            }
+        }
+    }
+
+    /// The longest steps down and up within the range.
+    fn room(&self) -> [f64; 2] {
+        let [least, most] = self.range;
+        let moved = self.moved();
+        let values = || self.values[self.at..].iter().zip(&moved);
+        let down = values().map(|(value, moved)| (value - least) / moved).fold(f64::INFINITY, f64::min);
+        let up = values().map(|(value, moved)| (most - value) / moved).fold(f64::INFINITY, f64::min);
+        [down.max(0.0), up.max(0.0)]
+    }
 }
 
 impl Term {
@@ -71,9 +105,10 @@ impl Term {
         Some((values[at] - neutral, range[1] - range[0]))
     }
 
-    /// True if a knot's value must not be less than the one before.
-    pub(super) fn rises(&self, knot: usize) -> bool {
-        self.listed_at(knot).is_some_and(|listed| listed.rises)
+    /// By how much a knot's value moves with an earlier one, or with itself.
+    pub(super) fn moves_with(&self, knot: usize, earlier: usize) -> f64 {
+        let later = knot - earlier;
+        self.listed_at(earlier).and_then(|listed| listed.moved().get(later).copied()).unwrap_or(0.0)
     }
 
     /// Those of its curve come first, then those of its tables.
@@ -81,10 +116,16 @@ impl Term {
         if let Some((table, at)) = self.table_at(knot) {
             let (parameter, table) = &self.tables[table];
             let range = self.definition.parameters[*parameter].range;
-            return Some(Listed { values: &table.values, at, range, rises: false });
+            return Some(Listed { values: &table.values, at, range, rises: Rises::No, places: &[] });
         }
         let (curve, knots) = self.curve().zip(self.knots.as_ref())?;
-        Some(Listed { values: &knots.values, at: knot, range: curve.range, rises: curve.increasing })
+        Some(Listed {
+            values: &knots.values,
+            at: knot,
+            range: curve.range,
+            rises: curve.rises,
+            places: &knots.at,
+        })
     }
 
     /// The table that a knot is in, and its number there; `None` if it is one of the curve's.
@@ -118,40 +159,42 @@ impl Term {
         }
     }
 
-    /// Moves a value, or from one knot on all values, and returns by how much; less than `step` at the end of the range.
+    /// Moves a value, and from it on what rises with it, and returns by how much; less than `step` at the end of the range.
     pub(super) fn move_knot(&mut self, knot: usize, step: f64) -> f64 {
         let least_step = self.least_step(knot);
-        let Some(Listed { values, at, range: [least, most], rises }) = self.listed_at(knot) else {
-            return 0.0;
-        };
-        let last = if rises { values.len() - 1 } else { at };
-        let taken = step.max(least_step).min((most - values[last]).max(0.0));
+        let Some(listed) = self.listed_at(knot) else { return 0.0 };
+        let (at, [least, most], rises) = (listed.at, listed.range, listed.rises);
+        let (moved, places) = (listed.moved(), listed.places.to_vec());
+        let taken = step.max(least_step).min(listed.room()[1]);
         let Some(values) = self.listed_mut(knot) else { return 0.0 };
-        // Rounding must not bring a value out of its range, or below the one before.
-        for value in &mut values[at..=last] {
-            *value = (*value + taken).clamp(least, most);
+        // Rounding must not bring a value out of its range, or below what the one before allows.
+        for (value, moved) in values[at..].iter_mut().zip(moved) {
+            *value = (*value + moved * taken).clamp(least, most);
         }
-        if rises {
-            for knot in at.max(1)..values.len() {
-                values[knot] = values[knot].max(values[knot - 1]);
-            }
-        }
+        keep_rising(rises, &places, values);
         taken
     }
 
     /// A small step of a knot, for a derivative: away from the end of the range.
     pub(super) fn small_step(&self, knot: usize) -> f64 {
-        let Some(Listed { values, at, range, rises }) = self.listed_at(knot) else { return 0.0 };
-        let step = STEP * (range[1] - range[0]);
-        let last = if rises { values.len() - 1 } else { at };
-        if values[last] + step > range[1] { -step } else { step }
+        let Some(listed) = self.listed_at(knot) else { return 0.0 };
+        let step = STEP * (listed.range[1] - listed.range[0]);
+        if step > listed.room()[1] { -step } else { step }
     }
 
     /// The least step of a knot that its class allows: not above 0.
     pub(super) fn least_step(&self, knot: usize) -> f64 {
-        let Some(Listed { values, at, range, rises }) = self.listed_at(knot) else { return 0.0 };
-        let before = at.checked_sub(1).filter(|_| rises).map(|before| values[before]);
-        before.unwrap_or(range[0]) - values[at]
+        let Some(listed) = self.listed_at(knot) else { return 0.0 };
+        let floor = listed.floor().map_or(f64::NEG_INFINITY, |floor| floor - listed.values[listed.at]);
+        floor.max(-listed.room()[0]).min(0.0)
+    }
+}
+
+/// Raises each value that is below what the one before allows.
+fn keep_rising(rises: Rises, places: &[f64], values: &mut [f64]) {
+    for knot in 1..places.len() {
+        let least = rises.least([places[knot - 1], places[knot]], values[knot - 1]);
+        values[knot] = values[knot].max(least.unwrap_or(f64::NEG_INFINITY));
     }
 }
 
@@ -250,14 +293,10 @@ pub(crate) fn of_formulas<'a>(
         values.iter_mut().zip(own).for_each(|(value, own)| *value += own);
     }
     let [least, most] = curve.range;
-    let mut before = least;
     for value in &mut values {
         *value = value.clamp(least, most);
-        if curve.increasing {
-            *value = value.max(before);
-            before = *value;
-        }
     }
+    keep_rising(curve.rises, at, &mut values);
     Knots { at: at.to_vec(), values }
 }
 

@@ -22,13 +22,30 @@ fn assert_near(got: &[f64], want: &[f64]) {
 
 #[test]
 fn a_curve_that_must_not_fall_moves_from_a_knot_on() {
-    let mut hardening = term("hardening", &[0.1, 0.2, 0.3], &[0.1, 0.3, 0.3]);
-    assert_near(&[hardening.move_knot(1, 0.5)], &[0.5]);
-    assert_near(&values(&hardening), &[0.1, 0.8, 0.8]);
+    let mut softening = term("softening", &[0.1, 0.2, 0.3], &[0.1, 0.3, 0.3]);
+    assert_near(&[softening.move_knot(1, 0.5)], &[0.5]);
+    assert_near(&values(&softening), &[0.1, 0.8, 0.8]);
     // Not below the knot before.
-    assert_near(&[hardening.least_step(1), hardening.move_knot(1, -2.0)], &[-0.7, -0.7]);
-    assert_near(&values(&hardening), &[0.1, 0.1, 0.1]);
-    assert_near(&[hardening.move_knot(0, 100.0)], &[19.9]);
+    assert_near(&[softening.least_step(1), softening.move_knot(1, -2.0)], &[-0.7, -0.7]);
+    assert_near(&values(&softening), &[0.1, 0.1, 0.1]);
+    assert_near(&[softening.move_knot(0, 100.0)], &[0.9]);
+    assert!(softening.effect().is_ok());
+}
+
+#[test]
+fn what_a_curve_adds_moves_from_a_knot_on() {
+    // Products of value and place: 0.1, 0.2 and 0.2.
+    let mut hardening = term("hardening", &[0.1, 0.2, 0.4], &[1.0, 1.0, 0.5]);
+    assert_near(&[hardening.move_knot(1, 0.5)], &[0.5]);
+    assert_near(&values(&hardening), &[1.0, 1.5, 0.75]);
+    assert_near(
+        &[hardening.moves_with(2, 1), hardening.moves_with(2, 2), hardening.moves_with(1, 0)],
+        &[0.5, 1.0, 0.5],
+    );
+    assert_near(&[hardening.least_step(1), hardening.move_knot(1, -2.0)], &[-1.0, -1.0]);
+    assert_near(&values(&hardening), &[1.0, 0.5, 0.25]);
+    // The range holds for each value.
+    assert_near(&[hardening.least_step(0), hardening.move_knot(2, 100.0)], &[-1.0, 19.75]);
     assert!(hardening.effect().is_ok());
 }
 

@@ -466,9 +466,9 @@ impl<'a> Problem<'a> {
             if let Free::Knot { term, knot } = one {
                 let of = &at.terms[*term];
                 // A value that is a sum of increments has the variance of the sum.
-                let first = if of.rises(*knot) { index - knot } else { index };
-                let covariance =
-                    |(i, j)| inverse[(i, j)] / (positive_root(gram[(i, i)]) * positive_root(gram[(j, j)]));
+                let first = index - knot;
+                let weight = |i: usize| of.moves_with(*knot, i - first) / positive_root(gram[(i, i)]);
+                let covariance = |(i, j)| weight(i) * weight(j) * inverse[(i, j)];
                 let seen = || (first..=index).filter(|i| gram[(*i, *i)] > 0.0);
                 let pairs = seen().flat_map(|i| seen().map(move |j| (i, j)));
                 let variance: f64 = pairs.map(covariance).sum();
@@ -491,7 +491,7 @@ impl<'a> Problem<'a> {
 }
 
 /// The least step of a free parameter that its class allows.
-fn least_step(at: &Parameters, free: Free) -> f64 {
+pub(super) fn least_step(at: &Parameters, free: Free) -> f64 {
     match free {
         Free::Knot { term, knot } => at.terms[term].least_step(knot),
         Free::SigmaIntercept | Free::SigmaSlope | Free::RunGain { .. } | Free::Of { .. } => f64::NEG_INFINITY,

@@ -46,7 +46,7 @@ pub(crate) enum Direction<'a> {
 
 impl Direction<'_> {
     /// The same direction in a list with so many others before.
-    pub(super) fn after(self, others: usize) -> Self {
+    pub(crate) fn after(self, others: usize) -> Self {
         if let Self::Times { direction, factor } = self {
             return Self::Times { direction: direction + others, factor };
         }

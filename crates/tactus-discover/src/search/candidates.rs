@@ -162,7 +162,14 @@ fn free(definition: &'static Definition, amplitudes: &[usize], problem: &Problem
     if let Some(curve) = definition.curve.as_ref().filter(|curve| curve.kind == CurveKind::Line) {
         let at = places(curve, frames);
         let knots = Knots { values: vec![0.0; at.len()], at };
-        free.push(Term { knots: Some(knots), ..Term::neutral(definition) });
+        let mut shapes = vec![Term { knots: Some(knots), ..Term::neutral(definition) }];
+        // What the curve is a function of may be one thing, or another by a share.
+        for (parameter, known) in definition.parameters.iter().enumerate() {
+            if known.name.ends_with("_share") && !curve.replaces.contains(&known.name) {
+                shapes = cross(&shapes, parameter, &known.range);
+            }
+        }
+        free.extend(shapes);
     }
     for parameter in amplitudes {
         let known = &definition.parameters[*parameter];

@@ -176,6 +176,8 @@ pub(crate) struct Beside {
     pub(crate) fitted: Fitted,
     /// Logarithm of its odds.
     pub(crate) ln_odds: f64,
+    /// True if the model has the class already: then it takes up that one's misfit, not its own.
+    again: bool,
 }
 
 impl Search<'_> {
@@ -413,12 +415,13 @@ impl Search<'_> {
         starts: &[(&'static str, Vec<Term>)],
         units: f64,
     ) -> Result<Vec<Beside>, DiscoverError> {
+        let present = names(&at.parameters, self.known_terms);
         let fit = |(name, terms): &(&'static str, Vec<Term>)| {
             (self.progress)(&format!("fitting {name}"), 0.0);
             let mut started = at.parameters.clone();
             started.terms.extend(terms.iter().cloned());
             let fitted = self.problem.fit_from(started, FIRST_ROUNDS)?;
-            Ok(Beside { name, ln_odds: self.ln_odds(at, &fitted), fitted })
+            Ok(Beside { name, ln_odds: self.ln_odds(at, &fitted), fitted, again: present.contains(name) })
         };
         let mut fits: Vec<Beside> = parallel::map_longest_first(starts, |(_, terms)| terms.len(), fit)
             .into_iter()
@@ -441,7 +444,7 @@ impl Search<'_> {
         });
         let finish = |one: &Beside| {
             let fitted = self.problem.fit_from(one.fitted.parameters.clone(), TRIAL_ROUNDS)?;
-            Ok(Beside { name: one.name, ln_odds: self.ln_odds(at, &fitted), fitted })
+            Ok(Beside { ln_odds: self.ln_odds(at, &fitted), fitted, ..*one })
         };
         let mut fits: Vec<Beside> =
             parallel::map(&fits, finish).into_iter().collect::<Result<_, DiscoverError>>()?;
@@ -592,15 +595,15 @@ impl Search<'_> {
         self.fits(less, &starts, SET_UNITS)
     }
 
-    /// By what classes in one place are ranked: the logarithm of the odds, less a unit for one with a free part. That takes up the misfit for
-    /// which a formula is excused.
+    /// By what classes in one place are ranked: the logarithm of the odds, less that for which a formula is excused if it has a free part. One
+    /// that the model has already takes up its own misfit.
     fn rank(&self, one: &Beside) -> f64 {
-        self.rank_of(one.name, one.ln_odds, &one.fitted)
+        if one.again { one.ln_odds } else { self.rank_of(one.name, one.ln_odds, &one.fitted) }
     }
 
     fn rank_of(&self, name: &str, ln_odds: f64, at: &Fitted) -> f64 {
         let is_free = self.added(at, name).any(Term::is_free);
-        ln_odds - if is_free { self.unit(ln_odds, at) } else { 0.0 }
+        ln_odds - if is_free { excused(ln_odds) } else { 0.0 }
     }
 
     /// What counts as one in differences of the logarithm of the odds between classes in one place.

@@ -13,6 +13,7 @@ use super::evidence::{Addition, Evidence, Set, Signs, excused};
 use super::grow::{Search, names};
 use super::rivals::{Rival, rivals};
 use super::score::Score;
+use super::varying::is_varying;
 use crate::data::DiscoverError;
 use crate::fit::{Direction, Fitted, Free, Grams, Problem, RANDOM_WALK, Scale, Term};
 use crate::numbers::{median, parallel};
@@ -118,10 +119,11 @@ impl Pass {
     }
 }
 
-/// True if a rival takes the place of a class with these odds.
+/// True if a rival takes the place of a class with these odds: one without a name if it is clearly ahead; another effect of the model, whose
+/// strength varies, if the class is not clearly ahead of it.
 pub(super) fn rivals_win(rivals: &[(&'static str, f64)], ln_odds: f64) -> bool {
-    let best = rivals.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max);
-    best > ln_odds + excused(ln_odds)
+    let ahead = |rival: &str| if is_varying(rival) { -1.0 } else { 1.0 };
+    rivals.iter().any(|(rival, of_rival)| *of_rival > ln_odds + ahead(rival) * excused(ln_odds))
 }
 
 impl Search<'_> {
@@ -137,7 +139,9 @@ impl Search<'_> {
             gathered.add_candidate(problem, at, number, candidate);
         }
         let named = gathered.directions.len();
-        rivals(problem, at, self.rounds)?.into_iter().for_each(|rival| gathered.add_rival(rival));
+        rivals(problem, at, self.known_terms, self.rounds)?
+            .into_iter()
+            .for_each(|rival| gathered.add_rival(rival));
         let Gathered { directions, mut additions, kinds, classes } = gathered;
         let grams = problem.grams(at, directions)?;
         let last = grams.reduced().nrows() - 1;
@@ -216,8 +220,9 @@ impl<'a> Gathered<'a> {
         let shared = self.classes.iter().position(|class| Some(*class) == rival.beside);
         let shared = shared.and_then(|class| self.additions.iter().find(|one| one.class == class));
         let mut own = shared.map_or_else(Vec::new, |of| of.directions.clone());
-        own.extend(self.directions.len()..self.directions.len() + rival.columns.len());
-        self.directions.extend(rival.columns);
+        let first = self.directions.len();
+        own.extend(first..first + rival.columns.len());
+        self.directions.extend(rival.columns.into_iter().map(|column| column.after(first)));
         let (kind, signs) = match rival.free {
             Some((class, signs)) => (Kind::Free(class), signs),
             None => (Kind::Rival, vec![Signs::Both; own.len()]),

@@ -20,6 +20,8 @@
 //! | tone in travel | the length of the tip's way | 1 |
 //! | tone in x, in y | the tip's place | the element's own signal |
 //!
+//! Beside them stand the effects that the model has, each with a strength that varies ([`super::varying`]).
+//!
 //! The sum of signals and the place compete also with one function for loading and another for unloading.
 //!
 //! A class whose free part is a curve that model files cannot hold yet is as strong as that curve within the constraints of the class:
@@ -33,6 +35,7 @@ use std::sync::Arc;
 use super::covariates::{Factor, Feature, Form, Forms, LOW_MM};
 use super::evidence::Signs;
 use super::tones::{Point, Tone, clearest};
+use super::varying::varying;
 use crate::data::DiscoverError;
 use crate::fit::{Direction, Fitted, Problem, hat};
 
@@ -47,6 +50,7 @@ pub(crate) struct Rival<'a> {
     pub(crate) name: &'static str,
     /// The earlier rival whose columns are its own too.
     pub(crate) beside: Option<&'static str>,
+    /// [`Direction::Times`] counts from the first of them.
     pub(crate) columns: Vec<Direction<'a>>,
     /// From how many alternatives the residual picked it.
     pub(crate) among: f64,
@@ -54,11 +58,19 @@ pub(crate) struct Rival<'a> {
     pub(crate) free: Option<(&'static str, Vec<Signs>)>,
 }
 
-/// The rivals at a model. `rounds` if the converter's steps are seen: then each element in contact has an offset of its own anyway, and a tone
+impl<'a> Rival<'a> {
+    /// One with columns of its own.
+    pub(super) fn alone(name: &'static str, columns: Vec<Direction<'a>>) -> Self {
+        Self { name, beside: None, columns, among: 1.0, free: None }
+    }
+}
+
+/// The rivals at a model whose first terms are known. `rounds` if the converter's steps are seen: then each element in contact has an offset of its own anyway, and a tone
 /// in counts is the rounding.
 pub(crate) fn rivals<'a>(
     problem: &'a Problem<'_>,
     at: &'a Fitted,
+    known_terms: usize,
     rounds: bool,
 ) -> Result<Vec<Rival<'a>>, DiscoverError> {
     let seen = Arc::new(Seen::of(problem, at)?);
@@ -97,38 +109,40 @@ pub(crate) fn rivals<'a>(
     let low: Vec<bool> = height_mm.iter().zip(&free).map(|(mm, free)| *free && *mm <= LOW_MM).collect();
     let (of_sum, of_places) = (hats(&sums, deep), both(&of_place));
     let (of_sum_apart, of_places_apart) = (unloading(&of_sum), unloading(&of_places));
-    let alone = |name, columns| Rival { name, beside: None, columns, among: 1.0, free: None };
-    let apart =
-        |name, of: &'static str, hats| Rival { beside: Some(of), ..alone(name, smooth(hats, Form::Signal)) };
+    let apart = |name, of: &'static str, hats| Rival {
+        beside: Some(of),
+        ..Rival::alone(name, smooth(hats, Form::Signal))
+    };
     let of_distance = Seen::smooth(&seen, Seen::distance_mm, Seen::largest);
     // Near the tip, gains and the spread take up what the curve loses to its tail.
     let near = |knot| if knot < of_distance.len() / 2 { Signs::Both } else { Signs::Positive };
     let tail_signs = (0..of_distance.len()).map(near).collect();
     let mut found = vec![
-        alone("sum of signals", smooth(of_sum, Form::Signal)),
+        Rival::alone("sum of signals", smooth(of_sum, Form::Signal)),
         apart("sum of signals, apart", "sum of signals", of_sum_apart),
-        alone("share of the largest signal", Seen::smooth(&seen, Seen::share, Seen::signal)),
-        alone("place", smooth(of_places, Form::Signal)),
+        Rival::alone("share of the largest signal", Seen::smooth(&seen, Seen::share, Seen::signal)),
+        Rival::alone("place", smooth(of_places, Form::Signal)),
         apart("place, apart", "place", of_places_apart),
-        alone("place in the element", smooth(both(&in_element), Form::Signal)),
-        alone("direction of approach", aside.collect()),
-        alone("distance from the tip", of_distance),
+        Rival::alone("place in the element", smooth(both(&in_element), Form::Signal)),
+        Rival::alone("direction of approach", aside.collect()),
+        Rival::alone("distance from the tip", of_distance),
         Rival {
             beside: Some("distance from the tip"),
             free: Some(("heavy-tail", tail_signs)),
-            ..alone("radial curve with more weight far out", Vec::new())
+            ..Rival::alone("radial curve with more weight far out", Vec::new())
         },
-        alone("distance along the approach", Seen::smooth(&seen, Seen::ahead_mm, Seen::signal)),
-        alone("speed of travel", smooth(hats(&history.travel_mm_per_s, &free), Form::Offset)),
-        alone("height above the surface", smooth(hats(&height_mm, &low), Form::Place)),
+        Rival::alone("distance along the approach", Seen::smooth(&seen, Seen::ahead_mm, Seen::signal)),
+        Rival::alone("speed of travel", smooth(hats(&history.travel_mm_per_s, &free), Form::Offset)),
+        Rival::alone("height above the surface", smooth(hats(&height_mm, &low), Form::Place)),
     ];
     found.extend(tones(problem, at, &seen, rounds));
+    found.extend(varying(problem, at, known_terms, history));
     if !rounds {
         let in_contact: Arc<Vec<f64>> =
             Arc::new(deep.iter().map(|deep| f64::from(u8::from(*deep))).collect());
         let of_element =
             |element| seen.column(Factor::Element(element, Arc::clone(&in_contact)), Form::Offset);
-        found.push(alone("contact", (0..seen.elements).map(of_element).collect()));
+        found.push(Rival::alone("contact", (0..seen.elements).map(of_element).collect()));
     }
     found.retain(|rival| !rival.columns.is_empty() || rival.free.is_some());
     Ok(found)
@@ -303,7 +317,7 @@ impl Seen {
 
 /// For each knot, the weight of its value in a function that is straight between knots; 0 for bins that are not among those. No knots if
 /// the values do not differ.
-fn hats(values: &[f64], among: &[bool]) -> Vec<Vec<f64>> {
+pub(super) fn hats(values: &[f64], among: &[bool]) -> Vec<Vec<f64>> {
     let kept = values.iter().zip(among).filter(|(value, among)| **among && value.is_finite());
     let knots = knots(kept.map(|(value, _)| *value).collect());
     let hat = |knot: usize| {

@@ -50,7 +50,7 @@ fn the_tone_of_a_coarse_converter_is_no_rival() {
     assert!(prepared.lattice.is_some(), "the steps are seen");
     let problem = prepared.problem();
     let has_tone = |rounds: bool| {
-        let rivals = rivals(&problem, &prepared.base, rounds).unwrap();
+        let rivals = rivals(&problem, &prepared.base, 0, rounds).unwrap();
         rivals.iter().any(|rival| rival.name == "tone in counts")
     };
     assert!(has_tone(false) && !has_tone(true));

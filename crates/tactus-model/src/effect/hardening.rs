@@ -15,11 +15,12 @@
 //! | knots | unit | range | meaning |
 //! |---|---|---|---|
 //! | `at_mm` | mm | above 0 | places on the axis of `a_e` |
-//! | `growth` | - | 0 to 20, never falling | `growth` there, in straight lines from 0 at 0 and constant after the last; replaces `growth_at_1_mm` and `exponent` |
+//! | `growth` | - | 0 to 20; times the place, never falling | `growth` there, in straight lines from 0 at 0 and constant after the last; replaces `growth_at_1_mm` and `exponent` |
 //!
 //! `depth` is that of the tool, from 0 to the covering's thickness. With an `own_share` of 0 the covering hardens under the
 //! tool and spreads the result as before: all elements gain by the same factor. With 1 each element gains by its own signal,
-//! as in the base model's quadratic term. The effect only grows; a response that levels off is `saturation`.
+//! as in the base model's quadratic term. What the effect adds, `a growth(a)`, never falls: the
+//! response is nowhere less steep than in proportion. One that levels off is `saturation`.
 //!
 //! With a free gain, an `own_share` of 0 and depths to 0.6 mm it follows the elastic laws `exp(a depth) - 1` (`a` from 1 to 6
 //! per mm) and `depth^p` (`p` from 1.2 to 2) within 0.5 % rms of the greatest response, and `depth^3` within 2 %.
@@ -31,7 +32,9 @@
 //! of an elastic law, as in a Duffing spring, is an exponent of 2; the power law of a contact, K. L. Johnson, *Contact
 //! Mechanics* (1985), chapter 4, gives others.
 
-use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
+use super::{
+    BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises, Values,
+};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -49,7 +52,7 @@ pub(super) static DEFINITION: Definition = Definition {
         of: "growth",
         kind: CurveKind::Line,
         range: [0.0, 20.0],
-        increasing: true,
+        rises: Rises::ValueTimesPlace,
         replaces: &["growth_at_1_mm", "exponent"],
         formula: |values, at_mm| at_mm.iter().map(|at_mm| values[0] * at_mm.powf(values[1])).collect(),
     }),

@@ -45,7 +45,7 @@
 //! Transitions* (1996), chapter 2; plays between two curves, M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with
 //! Hysteresis* (1989), chapter 1.
 
-use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -64,7 +64,7 @@ pub(super) static DEFINITION: Definition = Definition {
         of: "loss_share",
         kind: CurveKind::Weights,
         range: [0.0, 5.0],
-        increasing: false,
+        rises: Rises::No,
         replaces: &["loss_share", "threshold_mm"],
         formula: |values, at_mm| {
             let parts = SHARES.map(|share| (share * values[1], values[0] / 4.0));

@@ -29,7 +29,7 @@
 //! Properties of Polymers* (1980), chapter 1.
 
 use super::lag::spread;
-use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -47,7 +47,7 @@ pub(super) static DEFINITION: Definition = Definition {
         of: "set_share",
         kind: CurveKind::Weights,
         range: [0.0, 1.0],
-        increasing: false,
+        rises: Rises::No,
         replaces: &["set_share", "recovery_s", "spread_ratio"],
         formula: |values, at_s| {
             let parts = spread(values[1], values[2]).map(|recovery_s| (recovery_s, values[0] / 3.0));

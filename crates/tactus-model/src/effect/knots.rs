@@ -27,8 +27,8 @@ pub struct FreeCurve {
     pub kind: CurveKind,
     /// Least and greatest value; 0 is among them.
     pub range: [f64; 2],
-    /// True if no value may be less than the one before it.
-    pub increasing: bool,
+    /// What must not fall from knot to knot.
+    pub rises: Rises,
     /// The parameters of the formula that the curve replaces. The others act beside it.
     pub replaces: &'static [&'static str],
     /// The formula's values at places, from one value for each parameter: where a fit of the knots starts.
@@ -42,6 +42,17 @@ pub enum CurveKind {
     Line,
     LogLine,
     Weights,
+}
+
+/// What of a curve must not fall from knot to knot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rises {
+    /// Nothing.
+    No,
+    /// Its value.
+    Value,
+    /// Its value times the place: what the effect adds.
+    ValueTimesPlace,
 }
 
 /// Places, and a curve's value at each.
@@ -81,10 +92,21 @@ impl Deref for Values {
     }
 }
 
+impl Rises {
+    /// The least value at a place after another with this value; `None` if it may be any.
+    pub fn least(self, [before_at, at]: [f64; 2], before: f64) -> Option<f64> {
+        match self {
+            Self::No => None,
+            Self::Value => Some(before),
+            Self::ValueTimesPlace => Some(before * (before_at / at)),
+        }
+    }
+}
+
 impl Knots {
     /// Checks them against the curve of an effect.
     pub(super) fn check(&self, effect: &'static str, curve: &FreeCurve) -> Result<(), EffectError> {
-        let FreeCurve { at, of, range: [least, most], increasing, .. } = *curve;
+        let FreeCurve { at, of, range: [least, most], rises, .. } = *curve;
         if self.at.len() != self.values.len() || !(1..=KNOTS_MAX).contains(&self.at.len()) {
             let [places, values] = [self.at.len(), self.values.len()];
             return Err(EffectError::KnotsNumber { effect, at, of, places, values });
@@ -97,15 +119,16 @@ impl Knots {
             }
             before = place;
         }
-        let mut before = least;
         for (index, value) in self.values.iter().copied().enumerate() {
             if !(least..=most).contains(&value) {
                 return refuse(of, index, value, format!("from {least} to {most}"));
             }
-            if increasing && value < before {
-                return refuse(of, index, value, format!("not below the value before, {before}"));
+            let Some(before) = index.checked_sub(1) else { continue };
+            let bound = rises.least([self.at[before], self.at[index]], self.values[before]);
+            if let Some(bound) = bound.filter(|bound| value < *bound) {
+                let what = if rises == Rises::Value { "it" } else { "it times the place" };
+                return refuse(of, index, value, format!("at least {bound}, so that {what} does not fall"));
             }
-            before = value;
         }
         Ok(())
     }

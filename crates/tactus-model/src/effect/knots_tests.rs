@@ -46,10 +46,18 @@ fn what_breaks_the_rules_of_a_curve_is_refused() {
         (0.5, 0.3, "at_mm[1] must be finite and above 0.5, not 0.4"),
         (0.2, -0.1, "growth[0] must be from 0 to 20, not -0.1"),
         (0.2, f64::INFINITY, "growth[0] must be from 0 to 20, not inf"),
-        (0.2, 0.7, "growth[1] must be not below the value before, 0.7, not 0.6"),
+        (0.2, 1.4, "growth[1] must be at least 0.7, so that it times the place does not fall, not 0.6"),
     ] {
         assert_eq!(refused(&[at_mm, 0.4], &[growth, 0.6]), format!("hardening: knots.{error}"));
     }
+    // What a foam adds while its cells close stays, so its share of the depth falls again.
+    assert!(hard(&[0.2, 0.4], &[1.2, 0.6]).is_ok());
+    let saturation = Definition::find("saturation").unwrap();
+    let falling = Knots { at: vec![0.2, 0.4], values: vec![0.7, 0.6] };
+    assert_eq!(
+        Effect::of_knots(saturation, [], falling).unwrap_err().to_string(),
+        "saturation: knots.lost_share[1] must be at least 0.7, so that it does not fall, not 0.6"
+    );
     assert_eq!(
         hard(&[0.1], &[0.2]).unwrap().with("exponent", 2.0).unwrap_err().to_string(),
         "hardening: exponent is replaced by the knots; leave it out"

@@ -28,7 +28,7 @@
 //! The strain-rate factor of G. R. Johnson and W. H. Cook, *Proc. 7th Int. Symp. on Ballistics* (1983), with 1 added
 //! to the ratio of speeds, so that rest is the base model's.
 
-use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -46,7 +46,7 @@ pub(super) static DEFINITION: Definition = Definition {
         of: "growth",
         kind: CurveKind::LogLine,
         range: [-0.9, 20.0],
-        increasing: false,
+        rises: Rises::No,
         replaces: &["stiffening_share", "speed_mm_per_s"],
         formula: |values, at| at.iter().map(|speed| values[0] * (speed / values[1]).ln_1p()).collect(),
     }),

@@ -42,7 +42,7 @@
 //! *Viscoelastic Properties of Polymers* (1980), chapter 1.
 
 use super::lag::{Lags, spread};
-use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -70,7 +70,7 @@ pub(super) static DEFINITION: Definition = Definition {
         of: "relaxed_share",
         kind: CurveKind::Weights,
         range: [0.0, 1.0],
-        increasing: false,
+        rises: Rises::No,
         replaces: &["relaxed_share", "time_constant_s", "spread_ratio"],
         formula: |values, at_s| {
             let parts = spread(values[1], values[2]).map(|tau_s| (tau_s, values[0] / 3.0));

@@ -29,7 +29,7 @@
 //! # Source
 //! The compression of an amplifier: C. Rapp, *Effects of HPA-Nonlinearity on a 4-DPSK/OFDM-Signal* (1991).
 
-use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, OnElement, Parameter};
+use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, OnElement, Parameter, Rises};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "saturation",
@@ -45,7 +45,7 @@ pub(super) static DEFINITION: Definition = Definition {
         of: "lost_share",
         kind: CurveKind::Line,
         range: [0.0, 0.99],
-        increasing: true,
+        rises: Rises::Value,
         replaces: &["loss_at_1_mm", "knee"],
         formula: |values, at_mm| {
             let formula = Saturation::new(values[0], values[1]);

@@ -27,7 +27,7 @@
 
 use libm::erf;
 
-use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -44,7 +44,7 @@ pub(super) static DEFINITION: Definition = Definition {
         of: "lost_share",
         kind: CurveKind::Line,
         range: [0.0, 1.0],
-        increasing: true,
+        rises: Rises::Value,
         replaces: &["softened_share", "width_share"],
         formula: |values, at| {
             let lost = |below: &f64| values[0] * erf(widths_below(1.0 - below, 1.0, values[1]));

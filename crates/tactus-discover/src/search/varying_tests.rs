@@ -1,0 +1,34 @@
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use tactus_model::Effect;
+
+use super::is_varying;
+use crate::fixtures::{ELEMENTS, INTERVAL_S, found, known, measured, processes};
+
+/// A covering that settles in 40 s is an offset of the surface that grows. What a constant offset misses of it is no further effect.
+#[test]
+fn what_an_effect_that_varies_misses_gets_no_name_of_its_own() {
+    let known = known();
+    let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(11));
+    let silent = vec![vec![0.0; ELEMENTS]; noise.len()];
+    let offset = Effect::new("surface-offset", [("offset_mm", -0.04)]).unwrap();
+    let [without, with] = [&[][..], &[offset]].map(|effects| measured(&known, effects, &silent));
+    let settled = |(frame, noise): (usize, &Vec<f64>)| -> Vec<f64> {
+        let share = 1.0 - (-(frame as f64) * INTERVAL_S / 40.0).exp();
+        let change = with.counts_of(frame).iter().zip(without.counts_of(frame));
+        change.zip(noise).map(|((with, without), noise)| noise + share * f64::from(with - without)).collect()
+    };
+    let frames = measured(&known, &[], &noise.iter().enumerate().map(settled).collect::<Vec<_>>());
+    let discovery = found(&known, &frames);
+    let names: Vec<&str> = discovery.steps.iter().map(|step| step.effect).collect();
+    assert_eq!(names, ["surface-offset"], "{:#?}", discovery.contests);
+    let lost = discovery.contests.iter().filter(|contest| !contest.kept);
+    let mut against = lost.flat_map(|contest| &contest.rivals);
+    assert!(against.any(|rivalry| rivalry.rival == "surface-offset that varies with time"));
+}
+
+#[test]
+fn only_effects_vary() {
+    assert!(is_varying("gain-drift that varies with depth"));
+    assert!(!is_varying("tone in x") && !is_varying("gain-drift"));
+}
