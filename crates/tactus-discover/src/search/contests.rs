@@ -20,6 +20,7 @@
 
 use super::forms::Formed;
 use super::grow::{Equivalent, LN_ODDS_LEAST, POLISH_ROUNDS, SHARE_AFTER_HOLD, Search, names, without};
+use super::varying::is_varying;
 use crate::data::DiscoverError;
 
 /// A rival acts like a class if it would take over more than this share.
@@ -68,9 +69,10 @@ impl Contest {
         Self { effect, ln_odds, rivals, classes: Vec::new(), left, kept: false }
     }
 
-    /// True if the class is only the nearest form of what a rival describes.
+    /// True if the class is only the nearest form of what a rival describes. What another effect in a form of its own explains beside the
+    /// class is that effect's.
     fn is_nearest_form(&self) -> bool {
-        self.rivals.iter().any(|rival| {
+        self.rivals.iter().filter(|rival| !is_varying(rival.rival)).any(|rival| {
             rival.instead - rival.beside.max(0.0) > TAKEN_SHARE * self.ln_odds
                 && rival.beside > LN_ODDS_LEAST.max(BESIDE_SHARE * self.ln_odds)
         })

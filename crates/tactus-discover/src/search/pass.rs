@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 use super::candidates::Candidate;
 use super::drift::TriedWalk;
 use super::evidence::{Addition, Evidence, Set, Signs, excused};
-use super::grow::{Search, names};
+use super::grow::{LN_ODDS_LEAST, Search, names};
 use super::rivals::{Rival, rivals};
 use super::score::Score;
 use super::varying::is_varying;
@@ -119,11 +119,11 @@ impl Pass {
     }
 }
 
-/// True if a rival takes the place of a class with these odds: one without a name if it is clearly ahead; another effect of the model, whose
-/// strength varies, if the class is not clearly ahead of it.
+/// True if a rival takes the place of a class with these odds: one without a name if it is ahead by more than a form is excused; another effect
+/// of the model, whose strength varies, if the class is not ahead of it by the odds with which a class holds its place.
 pub(super) fn rivals_win(rivals: &[(&'static str, f64)], ln_odds: f64) -> bool {
-    let ahead = |rival: &str| if is_varying(rival) { -1.0 } else { 1.0 };
-    rivals.iter().any(|(rival, of_rival)| *of_rival > ln_odds + ahead(rival) * excused(ln_odds))
+    let least = |rival: &str| if is_varying(rival) { -LN_ODDS_LEAST } else { excused(ln_odds) };
+    rivals.iter().any(|(rival, of_rival)| *of_rival > ln_odds + least(rival))
 }
 
 impl Search<'_> {

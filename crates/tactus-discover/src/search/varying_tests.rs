@@ -11,7 +11,7 @@ fn what_an_effect_that_varies_misses_gets_no_name_of_its_own() {
     let known = known();
     let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(11));
     let silent = vec![vec![0.0; ELEMENTS]; noise.len()];
-    let offset = Effect::new("surface-offset", [("offset_mm", -0.04)]).unwrap();
+    let offset = Effect::new("surface-offset", [("offset_mm", -0.003)]).unwrap();
     let [without, with] = [&[][..], &[offset]].map(|effects| measured(&known, effects, &silent));
     let settled = |(frame, noise): (usize, &Vec<f64>)| -> Vec<f64> {
         let share = 1.0 - (-(frame as f64) * INTERVAL_S / 40.0).exp();
