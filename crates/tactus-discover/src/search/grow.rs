@@ -20,6 +20,7 @@ use super::memory::Memory;
 use super::options::Options;
 use super::pass::{Kind, Pass, rivals_win};
 use super::score::{Score, flipped, largest, p_value};
+use super::varying::varying_effect;
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, Parameters, Problem, RANDOM_WALK, Term};
 use crate::numbers::parallel;
@@ -347,7 +348,9 @@ impl Search<'_> {
         let mut fits = self.fits(at, &starts, 0.0)?;
         let best_has_names = best_set.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
         let contest = |one: &Beside| {
-            let (strength, rivals) = pass.rivalry(one.name, one.ln_odds);
+            let (strength, mut rivals) = pass.rivalry(one.name, one.ln_odds);
+            // Whether another effect explains it in another form is asked once both are fitted.
+            rivals.retain(|(rival, _)| varying_effect(rival).is_none());
             let is_beaten = rivals_win(&rivals, strength) && !best_has_names;
             is_beaten.then(|| Contest::lost(one.name, one.ln_odds, self.left_over(&one.fitted), rivals))
         };
@@ -496,14 +499,17 @@ impl Search<'_> {
                 grown.at = self.fitted(grown, lesses[weakest].parameters.clone(), POLISH_ROUNDS)?;
                 continue 'again;
             }
-            for (nth, ((name, less), ln_odds)) in names.iter().zip(lesses).zip(odds).enumerate() {
+            for (nth, ((name, less), ln_odds)) in names.iter().zip(lesses).zip(odds.clone()).enumerate() {
                 let share = nth as f64 / names.len() as f64;
                 (self.progress)(
                     &format!("comparing {name} with others in its place"),
                     SHARE_BEFORE_HOLD + share * (SHARE_AFTER_HOLD - SHARE_BEFORE_HOLD),
                 );
                 let pass = self.pass(&less)?;
-                let (strength, rivals) = pass.rivalry(name, ln_odds);
+                let (strength, mut rivals) = pass.rivalry(name, ln_odds);
+                let odds_of = |effect| names.iter().zip(&odds).find(|(name, _)| **name == effect);
+                let is_stronger = |effect| odds_of(effect).is_some_and(|(_, odds)| *odds > ln_odds);
+                rivals.retain(|(rival, _)| varying_effect(rival).is_none_or(is_stronger));
                 let unit = self.unit(ln_odds, &grown.at);
                 if rivals_win(&rivals, strength) {
                     grown.refused.push(Contest::lost(name, ln_odds, self.left_over(&grown.at), rivals));

@@ -13,7 +13,7 @@ use super::evidence::{Addition, Evidence, Set, Signs, excused};
 use super::grow::{LN_ODDS_LEAST, Search, names};
 use super::rivals::{Rival, rivals};
 use super::score::Score;
-use super::varying::is_varying;
+use super::varying::varying_effect;
 use crate::data::DiscoverError;
 use crate::fit::{Direction, Fitted, Free, Grams, Problem, RANDOM_WALK, Scale, Term};
 use crate::numbers::{median, parallel};
@@ -122,7 +122,7 @@ impl Pass {
 /// True if a rival takes the place of a class with these odds: one without a name if it is ahead by more than a form is excused; another effect
 /// of the model, whose strength varies, if the class is not ahead of it by the odds with which a class holds its place.
 pub(super) fn rivals_win(rivals: &[(&'static str, f64)], ln_odds: f64) -> bool {
-    let least = |rival: &str| if is_varying(rival) { -LN_ODDS_LEAST } else { excused(ln_odds) };
+    let least = |rival| if varying_effect(rival).is_some() { -LN_ODDS_LEAST } else { excused(ln_odds) };
     rivals.iter().any(|(rival, of_rival)| *of_rival > ln_odds + least(rival))
 }
 

@@ -2,7 +2,8 @@
 //!
 //! Real physics has not quite the form of the library, and what its form misses may look like a small effect of another class. A class that
 //! stands beside others must beat what they would do if the strength of one of them varied: the change that it makes in the prediction, times a
-//! function of a covariate that is straight between knots. The covariates are the time, the depth and the tip's place.
+//! function of a covariate that is straight between knots. The covariates are the time, the depth and the tip's place. Only a stronger effect is
+//! such a rival: a weak one may be nearly in proportion to the signal, and times a function of the depth it would be any hardening.
 
 use std::sync::{Arc, LazyLock};
 
@@ -24,9 +25,9 @@ static NAMES: LazyLock<Vec<(&str, [String; 3])>> = LazyLock::new(|| {
     REGISTRY.iter().map(|definition| of(definition.name)).collect()
 });
 
-/// True of the names of these rivals.
-pub(super) fn is_varying(rival: &str) -> bool {
-    NAMES.iter().any(|(_, names)| names.iter().any(|name| name == rival))
+/// The effect that varies, if that is what a rival is.
+pub(super) fn varying_effect(rival: &str) -> Option<&'static str> {
+    NAMES.iter().find(|(_, names)| names.iter().any(|name| name == rival)).map(|(effect, _)| *effect)
 }
 
 /// The rivals at a model whose first terms are known.

@@ -2,7 +2,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tactus_model::Effect;
 
-use super::is_varying;
+use super::varying_effect;
 use crate::fixtures::{ELEMENTS, INTERVAL_S, found, known, measured, processes};
 
 /// A covering that settles in 40 s is an offset of the surface that grows. What a constant offset misses of it is no further effect.
@@ -28,7 +28,7 @@ fn what_an_effect_that_varies_misses_gets_no_name_of_its_own() {
 }
 
 #[test]
-fn only_effects_vary() {
-    assert!(is_varying("gain-drift that varies with depth"));
-    assert!(!is_varying("tone in x") && !is_varying("gain-drift"));
+fn a_rival_tells_the_effect_that_varies() {
+    assert_eq!(varying_effect("gain-drift that varies with depth"), Some("gain-drift"));
+    assert_eq!(["tone in x", "gain-drift"].map(varying_effect), [None, None]);
 }
