@@ -122,8 +122,8 @@ fn knots_that_break_the_rules_of_the_effects_curve_are_refused() {
         ("own_share = 0.25", "", "effect[0]: hardening: own_share is missing"),
         (
             "growth = [0.0, 0.1",
-            "growth = [0.2, 0.1",
-            "effect[0]: hardening: knots.growth[1] must be not below",
+            "growth = [0.6, 0.1",
+            "effect[0]: hardening: knots.growth[1] must be at least",
         ),
         ("[0.0, 0.1", "[-0.1, 0.1", "effect[0]: hardening: knots.growth[0] must be from 0 to 20, not -0.1"),
         ("at_mm = [0.1", "at_mm = [0.7", "effect[0]: hardening: knots.at_mm[1] must be finite and above 0.7"),
