@@ -136,11 +136,14 @@ impl Problem<'_> {
 }
 
 /// By how much a model that leaves `more` is nearer than one that leaves `less` to presses that a fit to the others predicts, block by
-/// block, in units of the noise's variance. A block counts at most four standard deviations: the press at the end of a drift, for
-/// example, is out of reach for a fit to the others.
+/// block, in units of the noise's variance. A block counts at most four standard deviations of those that tell something: the press at the
+/// end of a drift, for example, is out of reach for a fit to the others. Where the models differ by less than the noise of one number, as
+/// far from contact, a block tells nothing, and such blocks must not set the scale.
 pub(crate) fn gains_by_folds(less: &[f64], more: &[f64]) -> Vec<f64> {
     let gains: Vec<f64> = less.iter().zip(more).map(|(less, more)| less - more).collect();
-    let most = CLIP * NORMAL_PER_MEDIAN * median(&gains.iter().map(|gain| gain.abs()).collect::<Vec<_>>());
+    let sizes = gains.iter().map(|gain| gain.abs());
+    let telling: Vec<f64> = sizes.filter(|size| *size >= 1.0).collect();
+    let most = if telling.is_empty() { 1.0 } else { CLIP * NORMAL_PER_MEDIAN * median(&telling) };
     gains.into_iter().map(|gain| gain.clamp(-most, most)).collect()
 }
 

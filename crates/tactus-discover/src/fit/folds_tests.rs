@@ -79,3 +79,13 @@ fn presses_that_a_fit_has_not_seen_are_further_from_it_and_a_true_effect_gains_o
     let gained = gains.iter().filter(|gain| **gain > 0.0).count();
     assert!(2 * gained > gains.len(), "{gained} of {}", gains.len());
 }
+
+#[test]
+fn blocks_without_contact_do_not_set_how_much_a_press_counts() {
+    let mut more = vec![0.1; 20];
+    more.extend([0.0, -30.0, -50.0, -1000.0]);
+    let gains = gains_by_folds(&[0.0; 24], &more);
+    // The median of the three that tell something is 50.
+    let most = 4.0 * 1.4826 * 50.0;
+    assert!((gains[22] - 50.0).abs() < 1e-12 && (gains[23] / most - 1.0).abs() < 1e-3, "{gains:?}");
+}

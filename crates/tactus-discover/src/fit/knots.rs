@@ -7,6 +7,8 @@
 //! # Source
 //! Least squares under bounds: C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems* (1974), chapter 23.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector};
 use tactus_model::Registration;
 use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Rises, Table};
@@ -22,6 +24,10 @@ const STEP: f64 = 1e-3;
 const OF_LINE: usize = 10;
 const OF_TIMES: usize = 9;
 const OF_THRESHOLDS: usize = 8;
+/// A line in time has a knot for so many presses, and so many knots at most: what drifts holds for several presses in a row. With fewer than
+/// the least, formulas follow as much.
+const PRESSES_A_KNOT: usize = 4;
+const OF_TIME_LINE: std::ops::RangeInclusive<usize> = 8..=24;
 /// Number of places of a table, and the least distance from the first to the last, in mm.
 const OF_TABLE: usize = 5;
 const APART_MM: f64 = 0.05;
@@ -233,24 +239,25 @@ pub(crate) fn table_places(by: By, frames: &Frames, registration: &Registration)
     (most - least > APART_MM).then(|| places.collect())
 }
 
-/// Places of a curve's knots that these frames can tell apart.
+/// Places of a curve's knots that these frames can tell apart; none if there are too few.
 pub(crate) fn places(curve: &FreeCurve, frames: &Frames) -> Vec<f64> {
     let deepest_mm = frames.position_mm.iter().map(|[_, _, z_mm]| -z_mm).fold(0.0, f64::max);
     let thickest_mm = frames.covering_mm.iter().copied().fold(0.0, f64::max);
     let depth_mm = deepest_mm.min(thickest_mm).max(f64::MIN_POSITIVE);
-    let even = |most: f64| (1..=OF_LINE).map(|k| most * k as f64 / OF_LINE as f64).collect();
+    let duration_s = frames.t_s.iter().copied().fold(1.0, f64::max);
     match (curve.at, curve.kind) {
-        ("at_s", _) => {
-            let duration_s = frames.t_s.iter().copied().fold(1.0, f64::max);
-            logarithmic(2.0 * interval_s(frames), duration_s, OF_TIMES)
+        ("at_s", CurveKind::Line) => {
+            let count = (presses(frames) / PRESSES_A_KNOT).min(*OF_TIME_LINE.end());
+            if OF_TIME_LINE.contains(&count) { even(duration_s, count) } else { Vec::new() }
         }
+        ("at_s", _) => logarithmic(2.0 * interval_s(frames), duration_s, OF_TIMES),
         ("at_mm_per_s", _) => {
             let fastest = fastest_mm_per_s(frames);
             logarithmic(LEAST_SPEED * fastest, fastest, OF_LINE)
         }
         (_, CurveKind::Weights) => logarithmic(LEAST_THRESHOLD * depth_mm, depth_mm, OF_THRESHOLDS),
-        ("at_mm", _) => even(depth_mm),
-        _ => even(1.0),
+        ("at_mm", _) => even(depth_mm, OF_LINE),
+        _ => even(1.0, OF_LINE),
     }
 }
 
@@ -263,9 +270,22 @@ pub(crate) fn hat(knots: &[f64], knot: usize, value: f64) -> f64 {
     slope(knot.checked_sub(1)).min(slope(Some(knot + 1))).clamp(0.0, 1.0)
 }
 
+fn even(most: f64, count: usize) -> Vec<f64> {
+    (1..=count).map(|k| most * k as f64 / count as f64).collect()
+}
+
 fn logarithmic(least: f64, most: f64, count: usize) -> Vec<f64> {
     let last = (count - 1) as f64;
     (0..count).map(|k| least * (most / least).powf(k as f64 / last)).collect()
+}
+
+/// Number of presses of all runs.
+fn presses(frames: &Frames) -> usize {
+    let presses: BTreeSet<(usize, i32)> = (0..frames.len())
+        .filter(|frame| frames.press[*frame] >= 0)
+        .map(|frame| (frames.runs.partition_point(|(_, end)| *end <= frame), frames.press[frame]))
+        .collect();
+    presses.len()
 }
 
 /// The greatest speed at which the tool goes down in the covering.

@@ -161,12 +161,15 @@ fn free(definition: &'static Definition, amplitudes: &[usize], problem: &Problem
     // Weights of times or thresholds are what several shapes make together.
     if let Some(curve) = definition.curve.as_ref().filter(|curve| curve.kind == CurveKind::Line) {
         let at = places(curve, frames);
-        let knots = Knots { values: vec![0.0; at.len()], at };
-        let mut shapes = vec![Term { knots: Some(knots), ..Term::neutral(definition) }];
-        // What the curve is a function of may be one thing, or another by a share.
+        let knots = Some(Knots { values: vec![0.0; at.len()], at }).filter(|knots| !knots.at.is_empty());
+        let shape = knots.map(|knots| Term { knots: Some(knots), ..Term::neutral(definition) });
+        let mut shapes: Vec<Term> = shape.into_iter().collect();
+        // What the curve is a function of may be one thing, or others by a share.
         for (parameter, known) in definition.parameters.iter().enumerate() {
             if known.name.ends_with("_share") && !curve.replaces.contains(&known.name) {
-                shapes = cross(&shapes, parameter, &known.range);
+                let mut values = vec![known.range[0], known.neutral, known.range[1]];
+                values.dedup();
+                shapes = cross(&shapes, parameter, &values);
             }
         }
         free.extend(shapes);

@@ -150,6 +150,8 @@ pub(crate) struct Grown {
     path: Vec<Fitted>,
     /// Classes that lost against a rival without a name, or are too small beside another.
     pub(crate) refused: Vec<Contest>,
+    /// Classes that lost their place against a rival, and the others of the model then: beside these they are not tried again.
+    barred: Vec<(Vec<&'static str>, &'static str)>,
 }
 
 impl From<Fitted> for Grown {
@@ -160,6 +162,7 @@ impl From<Fitted> for Grown {
             rounds: Vec::new(),
             equivalent: Equivalent::new(),
             refused: Vec::new(),
+            barred: Vec::new(),
         }
     }
 }
@@ -185,6 +188,26 @@ impl Search<'_> {
     /// Grows a model until no class is missing, unnecessary or worse than another.
     pub(crate) fn grow(&self, base: &Fitted) -> Result<Grown, DiscoverError> {
         let mut grown = Grown::from(base.clone());
+        loop {
+            self.add_classes(base, &mut grown)?;
+            let barred = grown.barred.len();
+            self.hold(&mut grown)?;
+            // Where a class has lost its place, another may have it.
+            if grown.barred.len() == barred {
+                return Ok(grown);
+            }
+        }
+    }
+
+    /// Names of the added effects of a model, sorted.
+    fn sorted_names(&self, at: &Fitted) -> Vec<&'static str> {
+        let mut names = names(&at.parameters, self.known_terms);
+        names.sort_unstable();
+        names
+    }
+
+    /// Adds classes until none is missing.
+    fn add_classes(&self, base: &Fitted, grown: &mut Grown) -> Result<(), DiscoverError> {
         let mut strongest = 0.0_f64;
         loop {
             let index = grown.rounds.len();
@@ -196,7 +219,7 @@ impl Search<'_> {
             // What is small beside the gain of another class may be an error of that one's form.
             let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
             let (fits, refused) = if 2.0 * tried.p_value <= ALPHA && !is_full {
-                self.next(&grown.at, &pass, least)?
+                self.next(grown, &pass, least)?
             } else {
                 (Vec::new(), None)
             };
@@ -219,11 +242,9 @@ impl Search<'_> {
                     grown.at = self.problem.fit_from(taken.fitted.parameters, POLISH_ROUNDS)?;
                     grown.path.push(grown.at.clone());
                 }
-                None => break,
+                None => return Ok(()),
             }
         }
-        self.hold(&mut grown)?;
-        Ok(grown)
     }
 
     /// What a grown model may still lack.
@@ -310,15 +331,20 @@ impl Search<'_> {
     /// the best one's contest. None are fitted if their first steps promise far less than `least`.
     fn next(
         &self,
-        at: &Fitted,
+        grown: &Grown,
         pass: &Pass,
         least: f64,
     ) -> Result<(Vec<Beside>, Option<Contest>), DiscoverError> {
+        let at = &grown.at;
+        let present = self.sorted_names(at);
+        let is_barred =
+            |class: &str| grown.barred.iter().any(|(beside, name)| *name == class && *beside == present);
+        let may_enter = |one: usize| !pass.is_named(one) || !is_barred(pass.class_of(one));
         let evidence = pass.evidence_on(pass.grams.reduced());
         let is_free = |one: usize| matches!(pass.kinds[one], Kind::Free(_));
-        let best_set = evidence.sets(|one| !is_free(one)).into_iter().next();
-        let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
-        let alone = evidence.sets_of_classes(&pass.among(|_| true), 0.0);
+        let best_set = evidence.sets(|one| !is_free(one) && may_enter(one)).into_iter().next();
+        let named = evidence.sets(|one| pass.is_named(one) && may_enter(one)).into_iter().next();
+        let alone = evidence.sets_of_classes(&pass.among(|class| !is_barred(class)), 0.0);
         let most = alone.first().map_or(0.0, |set| set.ln_odds);
         let mut proposed: Vec<(&'static str, Set)> = Vec::new();
         let mut propose = |set: &Set| {
@@ -470,9 +496,20 @@ impl Search<'_> {
     /// prior were as wide as its part of the gain allows.
     pub(crate) fn ln_odds(&self, less: &Fitted, more: &Fitted) -> f64 {
         let numbers = |fitted: &Fitted| -> usize { fitted.parameters.terms.iter().map(Term::numbers).sum() };
-        let gain = (less.cost - more.cost) / (2.0 * self.problem.variance);
+        let gain = (less.cost - more.cost) / (2.0 * self.problem.variance * self.rounding_excess(more));
         let count = numbers(more).saturating_sub(numbers(less)).max(1) as f64;
         gain - 0.5 * count * (2.0 * gain.max(0.0) / count).ln_1p() - ODDS_AGAINST.ln()
+    }
+
+    /// By how much the variance of readings exceeds that of the weights. A coarse converter rounds a signal at rest to the same reading again
+    /// and again, so repeats in time do not show its error, and steps may be uneven: what a model leaves tells how large it is at most.
+    fn rounding_excess(&self, at: &Fitted) -> f64 {
+        if self.rounds { (at.cost / self.readings()).max(1.0) } else { 1.0 }
+    }
+
+    /// Number of fitted readings.
+    fn readings(&self) -> f64 {
+        self.problem.weights().filter(|weight| *weight > 0.0).count().max(1) as f64
     }
 
     /// Lets each class hold its place: against the model without it, rivals without a name, and other classes.
@@ -513,6 +550,7 @@ impl Search<'_> {
                 let unit = self.unit(ln_odds, &grown.at);
                 if rivals_win(&rivals, strength) {
                     grown.refused.push(Contest::lost(name, ln_odds, self.left_over(&grown.at), rivals));
+                    grown.barred.push((self.sorted_names(&less), name));
                     grown.at = self.fitted(grown, less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
                 }
@@ -619,8 +657,7 @@ impl Search<'_> {
 
     /// What a model leaves beyond the noise of the fitted presses, as a logarithm of odds.
     pub(super) fn left_over(&self, at: &Fitted) -> f64 {
-        let readings = self.problem.weights().filter(|weight| *weight > 0.0).count() as f64;
-        (at.cost - readings).max(0.0) / (2.0 * self.problem.variance)
+        (at.cost - self.readings()).max(0.0) / (2.0 * self.problem.variance)
     }
 }
 

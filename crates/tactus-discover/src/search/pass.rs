@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
+use tactus_model::effect::Rises;
 
 use super::candidates::Candidate;
 use super::drift::TriedWalk;
@@ -286,6 +287,10 @@ fn free_directions(problem: &Problem<'_>, at: &Fitted, of: &Candidate, shape: &T
     let knots = 0..shape.listed();
     let directions: Vec<_> = knots.map(|knot| problem.towards(&start, Free::Knot { term, knot })).collect();
     let count = directions.len();
-    // Each is an increment of a curve that must not fall.
-    Part { directions, widths: vec![width; count], signs: vec![Signs::Positive; count] }
+    // Each is a value that is not negative, or an increment of a curve that must not fall; or any value.
+    let signs = match shape.curve() {
+        Some(curve) if curve.range[0] < 0.0 && curve.rises == Rises::No => Signs::Both,
+        _ => Signs::Positive,
+    };
+    Part { directions, widths: vec![width; count], signs: vec![signs; count] }
 }

@@ -136,7 +136,9 @@ pub(crate) fn conclude(
     let upper_noise = grown_level.structured.map_or(f64::INFINITY, |part| part.upper_noise);
     let evidence = Evidence {
         is_named: named || lattice.is_some() || !faulty.effects.is_empty(),
-        is_missing: p_value <= ALPHA && options.rule == Rule::Protocol,
+        // An effect with good odds that lost against a rival was fitted because a test of the effects rejects the model without it.
+        is_missing: (p_value <= ALPHA || contests.iter().any(|contest| !contest.kept))
+            && options.rule == Rule::Protocol,
         is_left,
         upper_noise,
         tolerance_noise: options

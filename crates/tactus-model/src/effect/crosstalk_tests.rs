@@ -1,15 +1,32 @@
-use crate::effect::bench::{effect, model};
+use crate::Effect;
+use crate::effect::bench::model;
 use crate::effect::{BaseModel, Make};
 
 const NAMES: [&str; 5] =
     ["neighbour_share", "diagonal_share", "row_neighbour_share", "row_share", "column_share"];
 
 fn crossed(shares: [f64; 5], signal: &[f64]) -> Vec<f64> {
-    let effect = effect("crosstalk", std::array::from_fn::<_, 5, _>(|k| (NAMES[k], shares[k])));
+    with(std::array::from_fn::<_, 5, _>(|k| (NAMES[k], shares[k])), signal)
+}
+
+/// With shares of some kinds, and none of the others.
+fn kinds<const N: usize>(shares: [(&str, f64); N], signal: &[f64]) -> Vec<f64> {
+    let none = NAMES.into_iter().filter(|name| shares.iter().all(|(given, _)| given != name));
+    with(none.map(|name| (name, 0.0)).chain(shares).collect::<Vec<_>>(), signal)
+}
+
+fn with<'a>(parameters: impl IntoIterator<Item = (&'a str, f64)>, signal: &[f64]) -> Vec<f64> {
+    let effect = Effect::new("crosstalk", parameters).expect("parameters");
     let Make::Element(make) = effect.definition().make else { panic!("an effect of the elements") };
     let (model, mut out) = (model(), signal.to_vec());
     let base = BaseModel { model: &model, covering: crate::effect::bench::THIN };
-    make(effect.values()).signal(base, signal, &mut out);
+    let crosstalk = make(effect.values());
+    crosstalk.signal(base, signal, &mut out);
+    let response = model.response();
+    let gains = || response.sensitivity_counts_per_mm.iter().zip(&response.baseline_counts);
+    out.iter_mut().zip(gains()).for_each(|(u, (gain, baseline))| *u = baseline + gain * *u);
+    crosstalk.counts(base, &mut out);
+    out.iter_mut().zip(gains()).for_each(|(count, (gain, baseline))| *count = (*count - baseline) / gain);
     out
 }
 
@@ -51,4 +68,20 @@ fn a_signal_shows_in_its_row_and_its_column() {
     assert_eq!((row[8], row[10]), (0.25, 1.0));
     let column = crossed([0.0, 0.0, 0.0, 0.0, -0.25], &spike(10));
     assert_eq!(read(&column), [(2, -0.25), (10, 1.0), (18, -0.25), (26, -0.25), (34, -0.25), (42, -0.25)]);
+}
+
+#[test]
+fn a_signal_shows_two_away() {
+    let second = kinds([("second_share", 0.1)], &spike(18));
+    assert_eq!(read(&second), [(2, 0.1), (16, 0.1), (18, 1.0), (20, 0.1), (34, 0.1)]);
+    let ring = kinds([("ring_share", 0.1)], &spike(0));
+    assert_eq!(read(&ring), [(0, 1.0), (10, 0.1), (17, 0.1), (18, 0.1)]);
+}
+
+#[test]
+fn a_signal_shows_in_the_element_that_is_read_next_and_not_in_the_one_before() {
+    let carried = kinds([("row_neighbour_share", 0.1), ("row_lean_share", 0.1)], &spike(10));
+    assert_eq!(read(&carried), [(10, 1.0), (11, 0.2)]);
+    let down = kinds([("column_lean_share", 0.1)], &spike(10));
+    assert_eq!(read(&down), [(2, -0.1), (10, 1.0), (18, 0.1)]);
 }

@@ -1,33 +1,39 @@
 //! `softening`: the response is weaker up to the greatest earlier signal (Mullins effect).
 //!
 //! ```text
-//! u -> u (1 - lost_share(1 - u / m))          m = greatest u so far
+//! u -> u (1 - lost_share(x))
+//! x = (1 - |past_share|) (1 - u / m) + |past_share| q / (q + thickness)
+//! m = greatest u so far;   q = m if past_share > 0, or the sum of all rises of u so far
 //!
 //! lost_share(x) = softened_share erf((1 - (1 - x)^2) / width_share), or through knots
 //! ```
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `softened_share` | - | 0 | -1 to 1 | share of the signal that is lost far below the greatest signal so far |
-//! | `width_share` | - | 1 | 0.01 to 10 | width of the transition below `m`, as a share of the energy `m^2` |
+//! | `softened_share` | - | 0 | -1 to 1 | share of the signal that is lost where `x` is 1 |
+//! | `width_share` | - | 1 | 0.01 to 10 | width of the transition; with a `past_share` of 0 as a share of the energy `m^2` |
+//! | `past_share` | - | 0 | -1 to 1 | what the loss follows: 0 how far below the greatest the signal is, 1 the greatest itself, -1 all loading so far; between, mixtures |
 //!
 //! | knots | unit | range | meaning |
 //! |---|---|---|---|
-//! | `at_share` | - | above 0 | how far below the greatest the signal is: `1 - u / m`, to 1 |
-//! | `lost_share` | - | 0 to 1, never falling | `lost_share` there, in straight lines from 0 at 0 and constant after the last; replaces both parameters |
+//! | `at_share` | - | above 0 | places on the axis of `x`, to 1 |
+//! | `lost_share` | - | 0 to 1, never falling | `lost_share` there, in straight lines from 0 at 0 and constant after the last; replaces `softened_share` and `width_share` |
 //!
-//! Each element has its own past. A first loading follows the base model, and so does loading beyond the greatest signal so
-//! far. Below that, unloading and every later press follow the same weaker curve. The covering does not recover.
+//! Each element has its own past, and the covering does not recover. With a `past_share` of 0 a first loading follows the base model, and so
+//! does loading beyond the greatest signal so far; below that, unloading and every later press follow the same weaker curve. With 1 it is
+//! damage: the signal loses the same share at every depth until it goes beyond its greatest, as a first loading does all the way. With
+//! -1 it goes on with every press.
 //!
 //! Cost: an error function for each element.
 //!
 //! # Source
 //! The Mullins effect in the pseudo-elastic form of R. W. Ogden and D. G. Roxburgh, *Proc. R. Soc. Lond. A* 455 (1999),
-//! with the strain energy of a linear spring and a width in proportion to the greatest energy.
+//! with the strain energy of a linear spring and a width in proportion to the greatest energy. Damage by the greatest strain: J. C. Simo,
+//! *Comput. Methods Appl. Mech. Eng.* 60 (1987) 153; by the whole path: C. Miehe, *Eur. J. Mech. A* 14 (1995) 697.
 
 use libm::erf;
 
-use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises};
+use super::{CurveKind, Definition, FreeCurve, Make, Now, OnCovering, Parameter, Rises, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -36,6 +42,7 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[
         Parameter::real("softened_share", 0.0, [-1.0, 1.0]),
         Parameter::real("width_share", 1.0, [0.01, 10.0]),
+        Parameter::real("past_share", 0.0, [-1.0, 1.0]).or_neutral(),
     ],
     near_twins: &["hysteresis", "relaxation", "gain-drift"],
     shown_by: &["repeats", "ladder"],
@@ -46,66 +53,70 @@ pub(super) static DEFINITION: Definition = Definition {
         range: [0.0, 1.0],
         rises: Rises::Value,
         replaces: &["softened_share", "width_share"],
-        formula: |values, at| {
-            let lost = |below: &f64| values[0] * erf(widths_below(1.0 - below, 1.0, values[1]));
-            at.iter().map(lost).collect()
-        },
+        formula: |values, at| at.iter().map(|place| lost_share(values, *place)).collect(),
     }),
-    make: Make::Covering(|values| match values.knots() {
-        Some(knots) => Box::new(FreeSoftening { lost_share: knots.clone(), greatest_mm: Vec::new() }),
-        None => {
-            Box::new(Softening { softened_share: values[0], width_share: values[1], greatest_mm: Vec::new() })
-        }
+    make: Make::Covering(|values| {
+        Box::new(Softening { values: values.clone(), past_share: values[2], pasts: Vec::new() })
     }),
 };
 
 #[derive(Debug)]
 struct Softening {
-    softened_share: f64,
-    width_share: f64,
-    greatest_mm: Vec<f64>,
+    values: Values,
+    past_share: f64,
+    /// One for each element.
+    pasts: Vec<Past>,
+}
+
+/// What an element was loaded with.
+#[derive(Debug, Clone, Copy, Default)]
+struct Past {
+    last_mm: f64,
+    greatest_mm: f64,
+    /// Sum of all rises.
+    path_mm: f64,
 }
 
 impl OnCovering for Softening {
-    fn signal(&mut self, _: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
-        self.greatest_mm.resize(signal_mm.len(), 0.0);
-        for (u, greatest_mm) in signal_mm.iter_mut().zip(&mut self.greatest_mm) {
-            *greatest_mm = greatest_mm.max(*u);
-            let below = widths_below(*u, *greatest_mm, self.width_share);
-            *u *= 1.0 - self.softened_share * erf(below);
-        }
-    }
-
-    fn reset(&mut self) {
-        self.greatest_mm.clear();
-    }
-}
-
-#[derive(Debug)]
-struct FreeSoftening {
-    lost_share: Knots,
-    greatest_mm: Vec<f64>,
-}
-
-impl OnCovering for FreeSoftening {
-    fn signal(&mut self, _: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
-        self.greatest_mm.resize(signal_mm.len(), 0.0);
-        for (u, greatest_mm) in signal_mm.iter_mut().zip(&mut self.greatest_mm) {
-            *greatest_mm = greatest_mm.max(*u);
-            if *greatest_mm > 0.0 {
-                *u *= 1.0 - self.lost_share.line((1.0 - *u / *greatest_mm).min(1.0));
+    fn signal(&mut self, now: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
+        self.pasts.resize(signal_mm.len(), Past::default());
+        for (u, past) in signal_mm.iter_mut().zip(&mut self.pasts) {
+            past.load(*u);
+            if past.greatest_mm > 0.0 {
+                let place = past.place(*u, self.past_share, now.base.covering.thickness_mm);
+                let lost = self
+                    .values
+                    .knots()
+                    .map_or_else(|| lost_share(&self.values, place), |knots| knots.line(place));
+                *u *= 1.0 - lost;
             }
         }
     }
 
     fn reset(&mut self) {
-        self.greatest_mm.clear();
+        self.pasts.clear();
     }
 }
 
-/// How far below the greatest a signal is, in energy and in widths; 0 for what never was pressed.
-fn widths_below(u: f64, greatest_mm: f64, width_share: f64) -> f64 {
-    if greatest_mm > 0.0 { (1.0 - (u / greatest_mm).powi(2)).max(0.0) / width_share } else { 0.0 }
+impl Past {
+    fn load(&mut self, u: f64) {
+        self.path_mm += (u - self.last_mm).max(0.0);
+        self.greatest_mm = self.greatest_mm.max(u);
+        self.last_mm = u;
+    }
+
+    /// Where a signal is on the axis of the loss, 0 to 1.
+    fn place(&self, u: f64, past_share: f64, thickness_mm: f64) -> f64 {
+        let below = (1.0 - u / self.greatest_mm).min(1.0);
+        let loaded_mm = if past_share > 0.0 { self.greatest_mm } else { self.path_mm };
+        let share = past_share.abs();
+        (1.0 - share) * below + share * loaded_mm / (loaded_mm + thickness_mm)
+    }
+}
+
+/// The formula.
+fn lost_share(values: &[f64], place: f64) -> f64 {
+    values[0] * erf((1.0 - (1.0 - place).powi(2)).max(0.0) / values[1])
 }
 
 #[cfg(test)]
