@@ -136,9 +136,7 @@ pub(crate) fn conclude(
     let upper_noise = grown_level.structured.map_or(f64::INFINITY, |part| part.upper_noise);
     let evidence = Evidence {
         is_named: named || lattice.is_some() || !faulty.effects.is_empty(),
-        // An effect with good odds that lost against a rival was fitted because a test of the effects rejects the model without it.
-        is_missing: (p_value <= ALPHA || contests.iter().any(|contest| !contest.kept))
-            && options.rule == Rule::Protocol,
+        is_missing: options.rule == Rule::Protocol && (p_value <= ALPHA || has_refused(&contests)),
         is_left,
         upper_noise,
         tolerance_noise: options
@@ -214,6 +212,11 @@ pub(crate) fn conclude(
         gap: before.gap.clone(),
         ..prepared.unjudged(&of_base, base_level, options)?
     })
+}
+
+/// True if a class lost against a rival: it was fitted because a test of the effects rejects the model without it.
+fn has_refused(contests: &[Contest]) -> bool {
+    contests.iter().any(|contest| !contest.kept)
 }
 
 /// Tests of a model: by effects, by covariates, of the scatter, and of the noise that should be each reading's own.

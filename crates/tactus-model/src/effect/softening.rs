@@ -70,6 +70,7 @@ struct Softening {
 
 /// What an element was loaded with.
 #[derive(Debug, Clone, Copy, Default)]
+#[expect(clippy::struct_field_names, reason = "the unit is the last word of a name")]
 struct Past {
     last_mm: f64,
     greatest_mm: f64,
