@@ -24,7 +24,7 @@ mod motion;
 mod noise;
 pub(crate) mod spectrum;
 
-pub(crate) use bins::{Bins, HeldOut};
+pub(crate) use bins::{Bins, HeldOut, presses};
 pub(crate) use contacts::Contacts;
 pub use error::DiscoverError;
 pub(crate) use faulty::{Faulty, MISWIRED, rewired};

@@ -189,6 +189,11 @@ impl HeldOut {
     }
 }
 
+/// Number of presses of all runs.
+pub(crate) fn presses(frames: &Frames) -> usize {
+    PressSpan::of(frames).len()
+}
+
 /// Frames of a press and of the rest after it, up to the next press or [`STRETCH_S`].
 struct PressSpan {
     first: usize,

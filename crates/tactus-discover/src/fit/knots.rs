@@ -7,8 +7,6 @@
 //! # Source
 //! Least squares under bounds: C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems* (1974), chapter 23.
 
-use std::collections::BTreeSet;
-
 use nalgebra::{DMatrix, DVector};
 use tactus_model::Registration;
 use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Rises, Table};
@@ -16,7 +14,7 @@ use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Rises, Table};
 use super::parameters::Term;
 use super::problem::{Problem, solve};
 use super::scale::Scale;
-use crate::data::{Frames, interval_s};
+use crate::data::{Frames, interval_s, presses};
 
 /// Step of a value for derivatives, as a share of its range.
 const STEP: f64 = 1e-3;
@@ -189,7 +187,7 @@ impl Term {
     }
 
     /// The least step of a knot that its class allows: not above 0.
-    pub(super) fn least_step(&self, knot: usize) -> f64 {
+    pub(crate) fn least_step(&self, knot: usize) -> f64 {
         let Some(listed) = self.listed_at(knot) else { return 0.0 };
         let floor = listed.floor().map_or(f64::NEG_INFINITY, |floor| floor - listed.values[listed.at]);
         floor.max(-listed.room()[0]).min(0.0)
@@ -239,12 +237,12 @@ pub(crate) fn table_places(by: By, frames: &Frames, registration: &Registration)
     (most - least > APART_MM).then(|| places.collect())
 }
 
-/// Places of a curve's knots that these frames can tell apart; none if there are too few.
-pub(crate) fn places(curve: &FreeCurve, frames: &Frames) -> Vec<f64> {
+/// Places of a curve's knots that the frames can tell apart; none if there are too few.
+pub(crate) fn places(curve: &FreeCurve, problem: &Problem<'_>) -> Vec<f64> {
+    let (frames, duration_s) = (problem.predictor.frames, problem.duration_s);
     let deepest_mm = frames.position_mm.iter().map(|[_, _, z_mm]| -z_mm).fold(0.0, f64::max);
     let thickest_mm = frames.covering_mm.iter().copied().fold(0.0, f64::max);
     let depth_mm = deepest_mm.min(thickest_mm).max(f64::MIN_POSITIVE);
-    let duration_s = frames.t_s.iter().copied().fold(1.0, f64::max);
     match (curve.at, curve.kind) {
         ("at_s", CurveKind::Line) => {
             let count = (presses(frames) / PRESSES_A_KNOT).min(*OF_TIME_LINE.end());
@@ -277,15 +275,6 @@ fn even(most: f64, count: usize) -> Vec<f64> {
 fn logarithmic(least: f64, most: f64, count: usize) -> Vec<f64> {
     let last = (count - 1) as f64;
     (0..count).map(|k| least * (most / least).powf(k as f64 / last)).collect()
-}
-
-/// Number of presses of all runs.
-fn presses(frames: &Frames) -> usize {
-    let presses: BTreeSet<(usize, i32)> = (0..frames.len())
-        .filter(|frame| frames.press[*frame] >= 0)
-        .map(|frame| (frames.runs.partition_point(|(_, end)| *end <= frame), frames.press[frame]))
-        .collect();
-    presses.len()
 }
 
 /// The greatest speed at which the tool goes down in the covering.

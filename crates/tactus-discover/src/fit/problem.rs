@@ -221,6 +221,11 @@ impl<'a> Problem<'a> {
         self.predictor.bins.counts.iter().zip(predicted).map(|(counts, predicted)| counts - predicted)
     }
 
+    /// Number of fitted readings; at least 1.
+    pub(crate) fn readings(&self) -> f64 {
+        self.weights().filter(|weight| *weight > 0.0).count().max(1) as f64
+    }
+
     /// Weights of the fitted readings, bin by bin, element by element.
     pub(crate) fn weights(&self) -> impl Iterator<Item = f64> + '_ {
         self.train.iter().flat_map(|bin| self.element_weight.iter().map(move |element| bin * element))

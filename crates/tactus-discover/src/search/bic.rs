@@ -34,7 +34,6 @@ impl Search<'_> {
     /// The criterion less a constant that is the same for all models.
     fn criterion(&self, of: &Fitted) -> f64 {
         let parameters: usize = of.parameters.terms.iter().map(|term| term.values.len()).sum();
-        let readings = self.problem.weights().filter(|weight| *weight > 0.0).count();
-        of.cost + parameters as f64 * (readings.max(1) as f64).ln()
+        of.cost + parameters as f64 * self.problem.readings().ln()
     }
 }

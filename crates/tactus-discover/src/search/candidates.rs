@@ -160,7 +160,7 @@ fn free(definition: &'static Definition, amplitudes: &[usize], problem: &Problem
     let mut free = Vec::new();
     // Weights of times or thresholds are what several shapes make together.
     if let Some(curve) = definition.curve.as_ref().filter(|curve| curve.kind == CurveKind::Line) {
-        let at = places(curve, frames);
+        let at = places(curve, problem);
         let knots = Some(Knots { values: vec![0.0; at.len()], at }).filter(|knots| !knots.at.is_empty());
         let shape = knots.map(|knots| Term { knots: Some(knots), ..Term::neutral(definition) });
         let mut shapes: Vec<Term> = shape.into_iter().collect();

@@ -76,7 +76,7 @@ impl Search<'_> {
     /// The formula of a class as knots; `None` if it has no curve, or no formula to refute.
     fn as_knots(&self, formula: &Fitted, name: &str) -> Option<Knots> {
         let curve = self.added(formula, name).find_map(Term::curve)?;
-        let at = places(curve, self.problem.predictor.frames);
+        let at = places(curve, self.problem);
         let knots = of_formulas(curve, self.added(formula, name), &at);
         knots.values.iter().any(|value| *value != 0.0).then_some(knots)
     }

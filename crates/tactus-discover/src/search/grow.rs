@@ -199,13 +199,6 @@ impl Search<'_> {
         }
     }
 
-    /// Names of the added effects of a model, sorted.
-    fn sorted_names(&self, at: &Fitted) -> Vec<&'static str> {
-        let mut names = names(&at.parameters, self.known_terms);
-        names.sort_unstable();
-        names
-    }
-
     /// Adds classes until none is missing.
     fn add_classes(&self, base: &Fitted, grown: &mut Grown) -> Result<(), DiscoverError> {
         let mut strongest = 0.0_f64;
@@ -504,12 +497,7 @@ impl Search<'_> {
     /// By how much the variance of readings exceeds that of the weights. A coarse converter rounds a signal at rest to the same reading again
     /// and again, so repeats in time do not show its error, and steps may be uneven: what a model leaves tells how large it is at most.
     fn rounding_excess(&self, at: &Fitted) -> f64 {
-        if self.rounds { (at.cost / self.readings()).max(1.0) } else { 1.0 }
-    }
-
-    /// Number of fitted readings.
-    fn readings(&self) -> f64 {
-        self.problem.weights().filter(|weight| *weight > 0.0).count().max(1) as f64
+        if self.rounds { (at.cost / self.problem.readings()).max(1.0) } else { 1.0 }
     }
 
     /// Lets each class hold its place: against the model without it, rivals without a name, and other classes.
@@ -590,6 +578,13 @@ impl Search<'_> {
         }
     }
 
+    /// Names of the added effects of a model, sorted.
+    fn sorted_names(&self, at: &Fitted) -> Vec<&'static str> {
+        let mut names = names(&at.parameters, self.known_terms);
+        names.sort_unstable();
+        names
+    }
+
     /// A model fitted from these values, or the one that the rounds passed.
     fn fitted(&self, grown: &Grown, from: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
         match grown.passed(&from) {
@@ -657,7 +652,7 @@ impl Search<'_> {
 
     /// What a model leaves beyond the noise of the fitted presses, as a logarithm of odds.
     pub(super) fn left_over(&self, at: &Fitted) -> f64 {
-        (at.cost - self.readings()).max(0.0) / (2.0 * self.problem.variance)
+        (at.cost - self.problem.readings()).max(0.0) / (2.0 * self.problem.variance)
     }
 }
 

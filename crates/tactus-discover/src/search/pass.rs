@@ -6,7 +6,6 @@
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
-use tactus_model::effect::Rises;
 
 use super::candidates::Candidate;
 use super::drift::TriedWalk;
@@ -284,13 +283,11 @@ fn free_directions(problem: &Problem<'_>, at: &Fitted, of: &Candidate, shape: &T
     let start = at.parameters.with(shape.clone());
     let term = start.terms.len() - 1;
     let width = shape.curve().map_or(0.0, |curve| curve.range[1] - curve.range[0]);
-    let knots = 0..shape.listed();
-    let directions: Vec<_> = knots.map(|knot| problem.towards(&start, Free::Knot { term, knot })).collect();
-    let count = directions.len();
-    // Each is a value that is not negative, or an increment of a curve that must not fall; or any value.
-    let signs = match shape.curve() {
-        Some(curve) if curve.range[0] < 0.0 && curve.rises == Rises::No => Signs::Both,
-        _ => Signs::Positive,
-    };
-    Part { directions, widths: vec![width; count], signs: vec![signs; count] }
+    let knots = || 0..shape.listed();
+    let sign = |knot| if shape.least_step(knot) < 0.0 { Signs::Both } else { Signs::Positive };
+    Part {
+        directions: knots().map(|knot| problem.towards(&start, Free::Knot { term, knot })).collect(),
+        widths: vec![width; shape.listed()],
+        signs: knots().map(sign).collect(),
+    }
 }

@@ -55,15 +55,12 @@ pub(super) static DEFINITION: Definition = Definition {
         replaces: &["softened_share", "width_share"],
         formula: |values, at| at.iter().map(|place| lost_share(values, *place)).collect(),
     }),
-    make: Make::Covering(|values| {
-        Box::new(Softening { values: values.clone(), past_share: values[2], pasts: Vec::new() })
-    }),
+    make: Make::Covering(|values| Box::new(Softening { values: values.clone(), pasts: Vec::new() })),
 };
 
 #[derive(Debug)]
 struct Softening {
     values: Values,
-    past_share: f64,
     /// One for each element.
     pasts: Vec<Past>,
 }
@@ -84,7 +81,7 @@ impl OnCovering for Softening {
         for (u, past) in signal_mm.iter_mut().zip(&mut self.pasts) {
             past.load(*u);
             if past.greatest_mm > 0.0 {
-                let place = past.place(*u, self.past_share, now.base.covering.thickness_mm);
+                let place = past.place(*u, self.values[2], now.base.covering.thickness_mm);
                 let lost = self
                     .values
                     .knots()
