@@ -35,6 +35,7 @@ pub(crate) fn known() -> Known {
         registration: Registration { origin_mm: [0.0, 0.0], rotation_deg: 0.0 },
         indenters: [("cyl1".to_owned(), Indenter::Cylinder { diameter_mm: 1.0 })].into(),
         effects: Vec::new(),
+        drafts: Vec::new(),
     }
 }
 

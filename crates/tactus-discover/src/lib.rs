@@ -21,10 +21,10 @@ pub use next::{
     Experiments, LeftOut, NextExperiment, OpenQuestion, Plan, Rehearsal, RehearsalOrder, WORTH_Z,
 };
 pub use search::{
-    Contest, Curve, Gap, NotShown, Options, Point, RefutedFormula, Rivalry, Round, Rule, TriedEffect,
+    Contest, Curve, Gap, NoDraft, NotShown, Options, Point, RefutedFormula, Rivalry, Round, Rule, TriedEffect,
 };
 pub use tactus_calibrate::{FaultKind, FaultyElement};
 pub use verdict::{
-    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
-    Inclusion, Level, Split, Structured, Unexplained, Verdict,
+    AddedEffect, BaseModel, Discovery, DraftedEffect, ElementGap, Estimated, Final, FittedCurve, FittedKnot,
+    GlobalTest, Inclusion, Level, Split, Structured, Unexplained, Verdict,
 };

@@ -7,6 +7,8 @@
 //! its formula if the data refute that ([`forms`]). Random walks have a score of
 //! their own ([`drift`]), and pairs of elements are proposed by the residual ([`wiring`]).
 //!
+//! What no class explains is drafted as an effect from a small grammar ([`draft`]).
+//!
 //! [`locate`] applies the same test to covariates in place of effects: it tells where a model and the data disagree, in words that do
 //! not depend on the library; [`scatter`] tests whether the noise is the same everywhere. [`not_shown`] lists effects that these data could not show at any size.
 //!
@@ -16,6 +18,7 @@ mod bic;
 mod candidates;
 mod contests;
 mod covariates;
+mod draft;
 mod drift;
 mod evidence;
 mod forms;
@@ -34,6 +37,8 @@ mod wiring;
 
 pub(crate) use candidates::Candidate;
 pub use contests::{Contest, Rivalry};
+pub(crate) use draft::Drafted;
+pub use draft::NoDraft;
 pub use forms::RefutedFormula;
 pub(crate) use forms::{Formed, Refuted};
 pub(crate) use grow::{

@@ -12,10 +12,11 @@
 //! An added effect must be confirmed: fitted presses that its parameters have not seen, by five folds, must be nearer to the model with it than
 //! to the model without. The held-out presses are opened for the figures alone.
 //!
-//! The report is a [`Discovery`].
+//! Where the verdict leaves something unexplained, it is drafted ([`drafting`]). The report is a [`Discovery`].
 
 mod conclude;
 mod discovery;
+mod drafting;
 mod held_out;
 mod own_noise;
 mod structured;
@@ -25,4 +26,5 @@ pub use discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
     Inclusion, Level, Split, Unexplained, Verdict,
 };
+pub use drafting::DraftedEffect;
 pub use structured::Structured;

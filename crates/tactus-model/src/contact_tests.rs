@@ -11,7 +11,7 @@ fn contact(indenter: Indenter, rotation_deg: f64, depth_mm: f64) -> Contact {
 /// Volume and second moments about the tool's axis along x and y.
 fn moments(contact: &Contact, sigma_mm: f64) -> [f64; 3] {
     let mut sum = [0.0; 3];
-    for Slice { x_mm, y_mm: [low, high], weight_mm2 } in contact.slices(sigma_mm) {
+    for Slice { x_mm, y_mm: [low, high], weight_mm2, .. } in contact.slices(sigma_mm) {
         let (dx, low, high) = (x_mm - 3.0, low + 2.0, high + 2.0);
         sum[0] += weight_mm2 * (high - low);
         sum[1] += weight_mm2 * (high - low) * dx * dx;

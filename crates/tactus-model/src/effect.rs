@@ -47,6 +47,8 @@
 //! # Ok::<(), tactus_model::effect::EffectError>(())
 //! ```
 //!
+//! **Drafts.** What no class explains may be an effect as data, a [`Draft`]; see there.
+//!
 //! **The library**, in [`REGISTRY`]; these names are a contract of reports and model files:
 //!
 //! | stage | effects |
@@ -65,7 +67,7 @@
 //! crate: it is a `static` [`Definition`], given to [`Effect::of`].
 //!
 //! ```
-//! use tactus_model::effect::{BaseModel, Definition, Make, OnElement, Parameter};
+//! use tactus_model::effect::{Definition, Make, Now, OnElement, Parameter};
 //! use tactus_model::Effect;
 //!
 //! /// Elements lose a share of their signal: `u -> (1 - lost_share) u`.
@@ -85,7 +87,7 @@
 //! }
 //!
 //! impl OnElement for Loss {
-//!     fn signal(&self, _: BaseModel<'_>, _: &[f64], signal_mm: &mut [f64]) {
+//!     fn signal(&mut self, _: Now<'_>, _: &[f64], signal_mm: &mut [f64]) {
 //!         signal_mm.iter_mut().for_each(|u| *u *= 1.0 - self.lost_share);
 //!     }
 //! }
@@ -103,6 +105,7 @@ mod crosstalk;
 mod curve;
 mod definition;
 mod depth_dependent_spread;
+mod draft;
 mod edge_effect;
 mod gain_drift;
 mod hardening;
@@ -135,6 +138,8 @@ mod time_lag;
 struct AddingAnEffect;
 
 pub use definition::{Definition, Effect, EffectError, Make, Parameter, ParameterKind, PipelineStage};
+pub(crate) use draft::Drafted;
+pub use draft::{Carrier, Draft, Law, When};
 pub use knots::{CurveKind, FreeCurve, KNOTS_MAX, Knots, Rises, Values};
 pub use stage::{BaseModel, Load, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, TipState};
 pub(crate) use table::Tabled;

@@ -150,7 +150,7 @@ impl ForwardModel {
             let of_cols: Vec<f64> =
                 cols.iter().map(|side_mm| scale * along_x.of_point(*x_mm, *side_mm)).collect();
             for (row, side_mm) in indentation_mm.chunks_exact_mut(cols.len()).zip(&rows) {
-                let of_slice = |slice: &Slice| slice.weight_mm2 * along_y.of_line(slice.y_mm, *side_mm);
+                let of_slice = |slice: &Slice| of_sloped(along_y, slice, *side_mm);
                 let of_row: f64 = of_one_x.iter().map(of_slice).sum();
                 for (element, of_col) in row.iter_mut().zip(&of_cols) {
                     *element += of_col * of_row;
@@ -220,6 +220,17 @@ impl Response {
         let slices = self.reference_press().slices(sigma_mm).into_iter();
         slices.map(|s| s.weight_mm2 * blur.of_point(s.x_mm, side_x) * blur.of_line(s.y_mm, side_y)).sum()
     }
+}
+
+/// What a slice whose weight may grow along y gives to a side, in mm^3 per mm of x.
+fn of_sloped(along_y: Blur, slice: &Slice, side_mm: [f64; 2]) -> f64 {
+    let line_mm = along_y.of_line(slice.y_mm, side_mm);
+    let even = slice.weight_mm2 * line_mm;
+    if slice.slope_mm == 0.0 {
+        return even;
+    }
+    let middle_mm = f64::midpoint(slice.y_mm[0], slice.y_mm[1]);
+    even + slice.slope_mm * (along_y.moment_of_line(slice.y_mm, side_mm) - middle_mm * line_mm)
 }
 
 #[cfg(test)]

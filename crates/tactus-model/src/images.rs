@@ -10,7 +10,8 @@ use crate::{Contact, Indenter};
 /// same path with different effects. Most effects do not change the contact and its spread, so these images recur.
 ///
 /// The image of an upright tool with a flat face is proportional to its depth: one image serves all depths and agrees
-/// with the computed one to rounding. Other images are equal to the computed ones to the bit. Meshes are not cached.
+/// with the computed one to rounding. That of one that leans grows in proportion from the depth on at which its whole face touches, so that two
+/// images serve all depths from there. Other images are equal to the computed ones to the bit. Meshes are not cached.
 #[derive(Debug)]
 pub struct Images {
     held: Mutex<HashMap<Key, Arc<[f64]>>>,
@@ -32,11 +33,25 @@ impl Images {
         base: BaseModel<'_>,
         press: &Load,
         image_mm: &mut [f64],
-        compute: impl FnOnce(&Load, &mut [f64]),
+        compute: &impl Fn(&Load, &mut [f64]),
     ) {
         let thickness_mm = base.covering.thickness_mm;
+        let depth_mm = press.contact.depth_mm;
         if !is_even(press) {
-            return self.recall_as_it_is(base, press, image_mm, compute);
+            let whole_mm = press.contact.whole_from_mm(press.lean);
+            let Some(whole_mm) = whole_mm.filter(|whole_mm| (*whole_mm..=thickness_mm).contains(&depth_mm))
+            else {
+                return self.recall_as_it_is(base, press, image_mm, compute);
+            };
+            let at = |depth_mm: f64, lean| {
+                let contact = Contact { depth_mm, ..press.contact.clone() };
+                Load { contact, lean, ..press.clone() }
+            };
+            self.recall(base, &at(depth_mm - whole_mm, [0.0; 2]), image_mm, compute);
+            let mut leaning_mm = vec![0.0; image_mm.len()];
+            self.recall_as_it_is(base, &at(whole_mm, press.lean), &mut leaning_mm, compute);
+            image_mm.iter_mut().zip(leaning_mm).for_each(|(even, leaning)| *even += leaning);
+            return;
         }
         let contact = Contact { depth_mm: thickness_mm, ..press.contact.clone() };
         let deepest = Load { contact, ..press.clone() };
@@ -52,7 +67,7 @@ impl Images {
         base: BaseModel<'_>,
         press: &Load,
         image_mm: &mut [f64],
-        compute: impl FnOnce(&Load, &mut [f64]),
+        compute: &impl Fn(&Load, &mut [f64]),
     ) {
         let Some(key) = key(base, press) else { return compute(press, image_mm) };
         let known = self.held.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();

@@ -106,6 +106,7 @@ mod quadrature;
 mod readout;
 mod registration;
 mod simulator;
+mod trace;
 mod trail;
 mod trajectory;
 
@@ -125,6 +126,7 @@ pub use press_table::{PressTable, PressTableError};
 pub use readout::Readout;
 pub use registration::Registration;
 pub use simulator::{Image, Simulator};
+pub use trace::{Covariate, Seen, Trace};
 pub use trail::Trail;
 pub use trajectory::{Path, Trajectory, TrajectoryError};
 

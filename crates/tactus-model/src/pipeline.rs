@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::effect::{
-    BaseModel, Effect, EffectError, Load, Make, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout,
-    Tabled, TipState,
+    BaseModel, Drafted, Effect, EffectError, Load, Make, Now, OnContact, OnCovering, OnElement, OnMotion,
+    OnReadout, PipelineStage, Tabled, TipState,
 };
 use crate::{
     Contact, Covering, ForwardModel, Images, Indenter, Path, PressTable, PressTableError, Readout,
@@ -85,7 +85,7 @@ struct Elapsed {
 impl Elapsed {
     fn now(self, base: BaseModel<'_>) -> Now<'_> {
         let Self { t_s, dt_s, temperature_c } = self;
-        Now { t_s, dt_s, temperature_c, base }
+        Now { t_s, dt_s, temperature_c, base, contact: None, signal_mm: &[] }
     }
 }
 
@@ -211,16 +211,18 @@ impl Pipeline {
     /// Elements and readout.
     fn respond(&mut self, moment: Elapsed) -> &[f64] {
         let base = BaseModel { model: &self.model, covering: self.covering };
+        let now =
+            Now { contact: Some(&self.pressed.contact), signal_mm: &self.signal_mm, ..moment.now(base) };
         self.counts.copy_from_slice(&self.signal_mm);
-        for effect in &self.stages.element {
-            effect.signal(base, &self.signal_mm, &mut self.counts);
+        for effect in &mut self.stages.element {
+            effect.signal(now, &self.signal_mm, &mut self.counts);
         }
         self.model.respond(&mut self.counts);
         for effect in &self.stages.element {
             effect.counts(base, &mut self.counts);
         }
         for effect in &mut self.stages.readout {
-            effect.counts(moment.now(base), &mut self.counts);
+            effect.counts(now, &mut self.counts);
         }
         &self.counts
     }
@@ -244,11 +246,14 @@ impl Pipeline {
 
     /// Clears the history of every effect, and the time.
     pub fn reset(&mut self) {
-        let Stages { motion, contact: _, covering, element: _, readout } = &mut self.stages;
+        let Stages { motion, contact: _, covering, element, readout } = &mut self.stages;
         for effect in motion {
             effect.reset();
         }
         for effect in covering {
+            effect.reset();
+        }
+        for effect in element {
             effect.reset();
         }
         for effect in readout {
@@ -307,6 +312,15 @@ impl Stages {
                 Make::Covering(make) => stages.covering.push(make(values)),
                 Make::Element(make) => stages.element.push(make(values)),
                 Make::Readout(make) => stages.readout.push(make(values)),
+                Make::Draft(draft) => {
+                    let drafted = Box::new(Drafted::of(draft, values));
+                    match draft.stage() {
+                        PipelineStage::Motion | PipelineStage::Contact => stages.motion.push(drafted),
+                        PipelineStage::Covering => stages.covering.push(drafted),
+                        PipelineStage::Element => stages.element.push(drafted),
+                        PipelineStage::Readout => stages.readout.push(drafted),
+                    }
+                }
             }
         }
         stages
@@ -352,7 +366,7 @@ impl Pressed {
             if !tabulated {
                 let compute = |load: &Load, image_mm: &mut [f64]| load.indentation(base, image_mm);
                 match images {
-                    Some(images) => images.recall(base, load, &mut self.of_one_mm, compute),
+                    Some(images) => images.recall(base, load, &mut self.of_one_mm, &compute),
                     None => compute(load, &mut self.of_one_mm),
                 }
             }

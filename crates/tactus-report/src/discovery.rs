@@ -8,6 +8,7 @@ mod active;
 mod added;
 mod after;
 mod basis;
+mod draft;
 mod faulty;
 mod figures;
 mod gap;
@@ -29,7 +30,8 @@ use crate::{
 };
 
 pub use active::{ActiveRun, AmbiguousEffect, command};
-pub use figures::{element_maps, free_curve, levels, residual_against};
+pub use draft::status as draft_status;
+pub use figures::{drafted_curve, element_maps, free_curve, levels, residual_against};
 pub use json::discovery_json;
 pub use next::{Proposal, not_proposed, nothing_open, open, proposals};
 pub use words::in_words;

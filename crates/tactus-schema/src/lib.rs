@@ -1,7 +1,9 @@
-//! The contracts of Tactus: messages, bus keys, frames and times, the rig file, the model file, the measurement table.
+//! The contracts of Tactus: messages, bus keys, frames and times, the rig file, the model file, the draft file, the
+//! measurement table.
 //!
 //! Every change is a new version. There is no I/O: the caller reads and stores the texts and bytes.
 
+pub mod draft;
 pub mod key;
 pub mod model;
 pub mod rig;
@@ -12,6 +14,7 @@ mod frame;
 mod message;
 mod time;
 
+pub use draft::{DraftFile, DraftFileError};
 pub use frame::{Frame, FrameFlags};
 pub use message::{Message, pb};
 pub use model::{Model, ModelFileError};

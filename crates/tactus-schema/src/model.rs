@@ -20,6 +20,8 @@
 //! name = "indenter-size"
 //! tables.ratio = { by = "depth_mm", at = [0.0, 0.2], values = [0.8, 1.0] }
 //! ```
+//!
+//! An effect that the library does not name is there whole, as `effect.draft` ([`crate::draft`]), so that a model needs no other file.
 
 mod file;
 

@@ -285,7 +285,8 @@ pub(crate) struct DiscoverArgs {
     /// The model to compare with the data, instead of the rig file's; of the same array.
     #[arg(long, value_name = "FILE")]
     pub(crate) model: Option<PathBuf>,
-    /// Folder for report.html, report.json, model.toml and residuals.parquet, which appear there when all are complete.
+    /// Folder for report.html, report.json, model.toml, residuals.parquet and, where something is left that no effect explains,
+    /// draft-1.toml; they appear there when all are complete.
     #[arg(short, long, value_name = "DIR", default_value = "discovery")]
     pub(crate) out: PathBuf,
     /// Seed of the split into fitted and held-out presses and of the tests against noise.
@@ -301,6 +302,9 @@ pub(crate) struct DiscoverArgs {
     /// Folder of the lab's own experiments (.star), which may be proposed beside the built-in ones.
     #[arg(long, value_name = "DIR")]
     pub(crate) experiments: Option<PathBuf>,
+    /// Folder of drafts (.toml), the lab's own effects, which are tried beside those of the library.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) library: Option<PathBuf>,
     /// Run the experiments that distinguish the remaining explanations, and analyse again with their recordings. Without
     /// a service they run on the embedded simulated rig; without files the first run is `diagnose`.
     #[arg(long)]

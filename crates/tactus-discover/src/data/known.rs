@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use tactus_model::effect::Definition;
 use tactus_model::{Array, Effect, Indenter, Psf, Registration, Response};
 
 /// What is known beforehand: the model with which the data are compared.
@@ -19,4 +20,6 @@ pub struct Known {
     pub indenters: BTreeMap<String, Indenter>,
     /// Effects of the known model. They are refitted with the rest and never removed.
     pub effects: Vec<Effect>,
+    /// Effects that the lab has beside those of the library: drafts.
+    pub drafts: Vec<&'static Definition>,
 }

@@ -47,7 +47,8 @@ impl Candidate {
         at: &Fitted,
         frequencies_hz: &[f64],
     ) -> Result<Vec<Self>, DiscoverError> {
-        REGISTRY.iter().map(|definition| Self::of(definition, problem, at, frequencies_hz)).collect()
+        let library = REGISTRY.iter().chain(&problem.predictor.known.drafts);
+        library.map(|definition| Self::of(definition, problem, at, frequencies_hz)).collect()
     }
 
     fn of(

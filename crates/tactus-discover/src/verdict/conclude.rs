@@ -8,6 +8,7 @@ use super::discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
     Inclusion, Level, Split, Unexplained, Verdict,
 };
+use super::drafting::drafted;
 use super::held_out::{HeldOutResidual, SEEN_NOISE};
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
@@ -145,6 +146,13 @@ pub(crate) fn conclude(
             .map_or(0.0, |(tolerance, noise)| tolerance / noise),
     };
     let verdict = evidence.verdict();
+    let draft = match verdict {
+        Verdict::Unexplained | Verdict::PartlyExplained if options.rule == Rule::Protocol => {
+            let noise_counts = floor.rms_counts().unwrap_or(0.0);
+            Some(drafted(prepared, search, &grown, &of_grown, noise_counts)?)
+        }
+        _ => None,
+    };
     let squares = |level: Level| level.heldout_rms_counts.powi(2);
     let noise_square = floor.rms_counts().unwrap_or(0.0).powi(2);
     let gap = squares(base_level) - noise_square;
@@ -192,6 +200,7 @@ pub(crate) fn conclude(
             shrink: (p_value <= ALPHA && gap > 0.0).then(|| (closed / gap).min(1.0)),
         },
         verdict,
+        draft,
         unexplained: Unexplained {
             depends_on: if is_left && !is_clean {
                 depends_on(&after, [scatters[1], noise_of_grown])
@@ -333,7 +342,7 @@ fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> AddedEffec
     }
 }
 
-fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> BaseModel {
+pub(super) fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> BaseModel {
     let (sensitivity_counts_per_mm, run_gains) = parameters.centred();
     let response = Response {
         sensitivity_counts_per_mm,
@@ -387,6 +396,7 @@ impl Prepared<'_> {
             final_: Final { level, shrink: None },
             verdict: Verdict::CannotJudge,
             unexplained: Unexplained { depends_on: Vec::new(), share: 1.0 },
+            draft: None,
             plan: Plan::default(),
             grown: recalibrated.clone(),
             recalibrated,

@@ -4,11 +4,12 @@ use tactus_calibrate::FaultyElement;
 use tactus_model::effect::By;
 use tactus_model::{Effect, Psf, Response};
 
+use super::drafting::DraftedEffect;
 use super::structured::Structured;
 use crate::data::Floor;
 use crate::fit::RunWalks;
 use crate::next::Plan;
-use crate::search::{Contest, Curve, Gap, NotShown, RefutedFormula, Round};
+use crate::search::{Contest, Curve, Gap, NoDraft, NotShown, RefutedFormula, Round};
 
 /// What the data say about a model, and what they add to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,6 +53,8 @@ pub struct Discovery {
     pub verdict: Verdict,
     /// What the grown model leaves unexplained.
     pub unexplained: Unexplained,
+    /// The effect that was drafted of it, or why there is none; `None` where nothing is left to draft.
+    pub draft: Option<Result<Box<DraftedEffect>, NoDraft>>,
     /// Which experiments would decide what these data leave open.
     pub plan: Plan,
     /// The base model, recalibrated without added effects.

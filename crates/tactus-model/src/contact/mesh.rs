@@ -36,7 +36,12 @@ pub(super) fn slices(
             let lines: Vec<Line> = crossed.iter().filter_map(|facet| line_at(facet, x_mm)).collect();
             for line in deepest(&lines) {
                 if cut == Cut::Footprint {
-                    slices.push(Slice { x_mm, y_mm: line.map(|[y_mm, _]| y_mm), weight_mm2: width_mm });
+                    slices.push(Slice {
+                        x_mm,
+                        y_mm: line.map(|[y_mm, _]| y_mm),
+                        weight_mm2: width_mm,
+                        slope_mm: 0.0,
+                    });
                 } else {
                     stack(x_mm, width_mm, line, sigma_mm, &mut slices);
                 }

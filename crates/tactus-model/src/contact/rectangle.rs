@@ -40,7 +40,7 @@ pub(super) fn slices(
         })
         .map(|(dx, width_mm)| {
             let [low, high] = chord(dx);
-            Slice { x_mm: x + dx, y_mm: [y + low, y + high], weight_mm2: depth_mm * width_mm }
+            Slice { x_mm: x + dx, y_mm: [y + low, y + high], weight_mm2: depth_mm * width_mm, slope_mm: 0.0 }
         })
         .collect()
 }

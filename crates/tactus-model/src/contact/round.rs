@@ -84,6 +84,7 @@ pub(super) fn disc(
             x_mm: x + radius_mm * sin,
             y_mm: [y - half_chord_mm, y + half_chord_mm],
             weight_mm2: depth_mm * half_chord_mm * step,
+            slope_mm: 0.0,
         }
     })
 }

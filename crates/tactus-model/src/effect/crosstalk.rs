@@ -33,7 +33,9 @@
 //! Row-column addressing: charge that leaks between the lines of a capacitive matrix, and stray capacitance
 //! between neighbours.
 
-use super::{BaseModel, Definition, Make, OnElement, Parameter};
+use std::sync::OnceLock;
+
+use super::{BaseModel, Definition, Make, Now, OnElement, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "crosstalk",
@@ -54,21 +56,23 @@ pub(super) static DEFINITION: Definition = Definition {
     shown_by: &["element-centres", "grid-sweep"],
     curve: None,
     make: Make::Element(|values| {
-        let (shares, in_counts_share) = (std::array::from_fn(|share| values[share]), values[SUMS.len()]);
-        Box::new(Crosstalk { shares, in_counts_share })
+        let (shares, in_counts_share) = (std::array::from_fn(|share| values[share]), values[REACHES.len()]);
+        Box::new(Crosstalk { shares, in_counts_share, mixing: OnceLock::new() })
     }),
 };
 
 #[derive(Debug)]
 struct Crosstalk {
     /// In the order of the parameters.
-    shares: [f64; SUMS.len()],
+    shares: [f64; REACHES.len()],
     in_counts_share: f64,
+    /// For the array, once it is known.
+    mixing: OnceLock<Mixing>,
 }
 
 impl OnElement for Crosstalk {
-    fn signal(&self, base: BaseModel<'_>, _: &[f64], signal_mm: &mut [f64]) {
-        let added_mm = self.added(base, signal_mm, 1.0 - self.in_counts_share);
+    fn signal(&mut self, now: Now<'_>, _: &[f64], signal_mm: &mut [f64]) {
+        let added_mm = self.mixing(now.base).added(signal_mm, 1.0 - self.in_counts_share);
         for (u, added) in signal_mm.iter_mut().zip(added_mm) {
             *u += added;
         }
@@ -79,84 +83,117 @@ impl OnElement for Crosstalk {
             let baselines = &base.model.response().baseline_counts;
             let rises: Vec<f64> =
                 counts.iter().zip(baselines).map(|(count, baseline)| count - baseline).collect();
-            let added = self.added(base, &rises, self.in_counts_share);
+            let added = self.mixing(base).added(&rises, self.in_counts_share);
             counts.iter_mut().zip(added).for_each(|(count, added)| *count += added);
         }
     }
 }
 
 impl Crosstalk {
-    /// What is added to each element, times a factor.
-    fn added(&self, base: BaseModel<'_>, values: &[f64], factor: f64) -> Vec<f64> {
-        let mut added = vec![0.0; values.len()];
-        for (sum, share) in SUMS.iter().zip(self.shares).filter(|(_, share)| *share != 0.0) {
-            for (added, from_others) in added.iter_mut().zip(sum(base.model.array().cols(), values)) {
-                *added += factor * share * from_others;
-            }
-        }
-        added
+    fn mixing(&self, base: BaseModel<'_>) -> &Mixing {
+        self.mixing.get_or_init(|| {
+            let array = base.model.array();
+            Mixing::of(&self.shares, array.rows(), array.cols())
+        })
     }
 }
 
-/// For every element the sum over some others; the first argument is the number of columns.
-type Sum = fn(usize, &[f64]) -> Vec<f64>;
+/// The matrix of shares, without its zeros.
+#[derive(Debug)]
+struct Mixing {
+    /// For each element where its part of `parts` ends.
+    ends: Vec<usize>,
+    /// Another element, and the share of its signal.
+    parts: Vec<(usize, f64)>,
+}
 
-/// The sums, in the order of the effect's shares.
-const SUMS: [Sum; 9] = [
-    |cols, values| of_near(cols, values, &[[0, -1], [0, 1], [-1, 0], [1, 0]]),
-    |cols, values| of_near(cols, values, &[[-1, -1], [-1, 1], [1, -1], [1, 1]]),
-    |cols, values| of_near(cols, values, &[[0, -1], [0, 1]]),
-    of_rows,
-    of_columns,
-    |cols, values| of_near(cols, values, &[[0, -2], [0, 2], [-2, 0], [2, 0]]),
-    |cols, values| of_near(cols, values, &RING),
-    |cols, values| less(of_near(cols, values, &[[0, -1]]), of_near(cols, values, &[[0, 1]])),
-    |cols, values| less(of_near(cols, values, &[[-1, 0]]), of_near(cols, values, &[[1, 0]])),
+impl Mixing {
+    fn of(shares: &[f64; REACHES.len()], rows: usize, cols: usize) -> Self {
+        let (mut ends, mut parts) = (Vec::with_capacity(rows * cols), Vec::new());
+        for element in 0..rows * cols {
+            let mut of_element = vec![0.0; rows * cols];
+            for (reach, share) in REACHES.iter().zip(shares).filter(|(_, share)| **share != 0.0) {
+                reach.visit([rows, cols], element, |other, weight| of_element[other] += share * weight);
+            }
+            parts.extend(of_element.into_iter().enumerate().filter(|(_, share)| *share != 0.0));
+            ends.push(parts.len());
+        }
+        Self { ends, parts }
+    }
+
+    /// What is added to each element, times a factor.
+    fn added(&self, values: &[f64], factor: f64) -> Vec<f64> {
+        let mut start = 0;
+        let of_element = |end: &usize| {
+            let parts = &self.parts[start..*end];
+            start = *end;
+            factor * parts.iter().map(|(other, share)| share * values[*other]).sum::<f64>()
+        };
+        self.ends.iter().map(of_element).collect()
+    }
+}
+
+/// From which others an element takes a share.
+enum Reach {
+    /// Those at offsets in rows and columns, with a weight.
+    Near(&'static [([isize; 2], f64)]),
+    /// The others of its row.
+    Row,
+    /// The others of its column.
+    Column,
+}
+
+/// In the order of the effect's shares.
+const REACHES: [Reach; 9] = [
+    Reach::Near(&[([0, -1], 1.0), ([0, 1], 1.0), ([-1, 0], 1.0), ([1, 0], 1.0)]),
+    Reach::Near(&[([-1, -1], 1.0), ([-1, 1], 1.0), ([1, -1], 1.0), ([1, 1], 1.0)]),
+    Reach::Near(&[([0, -1], 1.0), ([0, 1], 1.0)]),
+    Reach::Row,
+    Reach::Column,
+    Reach::Near(&[([0, -2], 1.0), ([0, 2], 1.0), ([-2, 0], 1.0), ([2, 0], 1.0)]),
+    Reach::Near(&RING),
+    Reach::Near(&[([0, -1], 1.0), ([0, 1], -1.0)]),
+    Reach::Near(&[([-1, 0], 1.0), ([1, 0], -1.0)]),
 ];
 
 /// What is two away in row or column, less what is straight so.
-const RING: [[isize; 2]; 12] = [
-    [-2, -2],
-    [-2, -1],
-    [-2, 1],
-    [-2, 2],
-    [-1, -2],
-    [-1, 2],
-    [1, -2],
-    [1, 2],
-    [2, -2],
-    [2, -1],
-    [2, 1],
-    [2, 2],
+const RING: [([isize; 2], f64); 12] = [
+    ([-2, -2], 1.0),
+    ([-2, -1], 1.0),
+    ([-2, 1], 1.0),
+    ([-2, 2], 1.0),
+    ([-1, -2], 1.0),
+    ([-1, 2], 1.0),
+    ([1, -2], 1.0),
+    ([1, 2], 1.0),
+    ([2, -2], 1.0),
+    ([2, -1], 1.0),
+    ([2, 1], 1.0),
+    ([2, 2], 1.0),
 ];
 
-/// Sum over the existing elements at these offsets, in rows and columns.
-fn of_near(cols: usize, values: &[f64], places: &[[isize; 2]]) -> Vec<f64> {
-    let rows = values.len() / cols;
-    let at = |index: usize, [down, along]: [isize; 2]| {
-        let row = (index / cols).checked_add_signed(down).filter(|row| *row < rows)?;
-        let col = (index % cols).checked_add_signed(along).filter(|col| *col < cols)?;
-        values.get(row * cols + col)
-    };
-    (0..values.len()).map(|index| places.iter().filter_map(|place| at(index, *place)).sum()).collect()
-}
-
-fn less(values: Vec<f64>, others: Vec<f64>) -> Vec<f64> {
-    values.into_iter().zip(others).map(|(value, other)| value - other).collect()
-}
-
-fn of_rows(cols: usize, values: &[f64]) -> Vec<f64> {
-    let others = |row: &[f64]| -> Vec<f64> {
-        let sum: f64 = row.iter().sum();
-        row.iter().map(|own| sum - own).collect()
-    };
-    values.chunks(cols).flat_map(others).collect()
-}
-
-fn of_columns(cols: usize, values: &[f64]) -> Vec<f64> {
-    let sum = |col: usize| -> f64 { values.iter().skip(col).step_by(cols).sum() };
-    let sums: Vec<f64> = (0..cols).map(sum).collect();
-    values.iter().zip(sums.iter().cycle()).map(|(own, sum)| sum - own).collect()
+impl Reach {
+    /// Visits the others that exist, each with its weight.
+    fn visit(&self, [rows, cols]: [usize; 2], element: usize, mut visit: impl FnMut(usize, f64)) {
+        let (row, col) = (element / cols, element % cols);
+        match self {
+            Self::Near(offsets) => {
+                for ([down, along], weight) in *offsets {
+                    let row = row.checked_add_signed(*down).filter(|row| *row < rows);
+                    let col = col.checked_add_signed(*along).filter(|col| *col < cols);
+                    if let (Some(row), Some(col)) = (row, col) {
+                        visit(row * cols + col, *weight);
+                    }
+                }
+            }
+            Self::Row => {
+                (0..cols).filter(|other| *other != col).for_each(|other| visit(row * cols + other, 1.0))
+            }
+            Self::Column => {
+                (0..rows).filter(|other| *other != row).for_each(|other| visit(other * cols + col, 1.0));
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 use crate::Effect;
 use crate::effect::bench::model;
-use crate::effect::{BaseModel, Make};
+use crate::effect::{BaseModel, Make, Now};
 
 const NAMES: [&str; 5] =
     ["neighbour_share", "diagonal_share", "row_neighbour_share", "row_share", "column_share"];
@@ -20,8 +20,9 @@ fn with<'a>(parameters: impl IntoIterator<Item = (&'a str, f64)>, signal: &[f64]
     let Make::Element(make) = effect.definition().make else { panic!("an effect of the elements") };
     let (model, mut out) = (model(), signal.to_vec());
     let base = BaseModel { model: &model, covering: crate::effect::bench::THIN };
-    let crosstalk = make(effect.values());
-    crosstalk.signal(base, signal, &mut out);
+    let mut crosstalk = make(effect.values());
+    let now = Now { t_s: 0.0, dt_s: 0.0, temperature_c: None, base, contact: None, signal_mm: &[] };
+    crosstalk.signal(now, signal, &mut out);
     let response = model.response();
     let gains = || response.sensitivity_counts_per_mm.iter().zip(&response.baseline_counts);
     out.iter_mut().zip(gains()).for_each(|(u, (gain, baseline))| *u = baseline + gain * *u);

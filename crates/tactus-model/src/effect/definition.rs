@@ -1,5 +1,6 @@
 //! Definitions of effects: name, parameters and their values.
 
+use super::draft::Draft;
 use super::knots::{FreeCurve, KNOTS_MAX, Knots, Values};
 use super::table::{By, Table};
 use super::{OnContact, OnCovering, OnElement, OnMotion, OnReadout, REGISTRY};
@@ -77,6 +78,7 @@ pub enum Make {
     Covering(fn(&Values) -> Box<dyn OnCovering>),
     Element(fn(&Values) -> Box<dyn OnElement>),
     Readout(fn(&Values) -> Box<dyn OnReadout>),
+    Draft(&'static Draft),
 }
 
 /// A definition with a value or a table for each parameter, within its range; or with knots in place of its formula.
@@ -129,6 +131,9 @@ pub enum EffectError {
     /// An index is not that of an element of the array.
     #[error("{effect}: {parameter} must be one of the elements 0 to {last}, not {value}")]
     Element { effect: &'static str, parameter: &'static str, last: usize, value: f64 },
+    /// A draft is no effect.
+    #[error("draft {name:?}: {want}")]
+    Draft { name: String, want: String },
 }
 
 impl Definition {
@@ -149,6 +154,15 @@ impl Definition {
             Make::Covering(_) => PipelineStage::Covering,
             Make::Element(_) => PipelineStage::Element,
             Make::Readout(_) => PipelineStage::Readout,
+            Make::Draft(draft) => draft.stage(),
+        }
+    }
+
+    /// The draft that it is made from; `None` for an effect with a name of its own.
+    pub fn draft(&self) -> Option<&'static Draft> {
+        match self.make {
+            Make::Draft(draft) => Some(draft),
+            _ => None,
         }
     }
 
@@ -418,6 +432,9 @@ impl Effect {
 
     /// True if it names elements, and so belongs to one array.
     pub fn names_elements(&self) -> bool {
+        if self.definition.draft().is_some_and(|draft| draft.weights.is_some()) {
+            return true;
+        }
         let mut parameters = self.definition.parameters.iter().zip(self.values.iter());
         parameters.any(|(parameter, value)| parameter.names_element(*value))
     }
@@ -428,6 +445,7 @@ impl Effect {
             Make::Motion(_) | Make::Contact(_) => true,
             Make::Covering(make) => make(&self.values).spreads(),
             Make::Element(_) | Make::Readout(_) => false,
+            Make::Draft(draft) => draft.stage() == PipelineStage::Motion,
         }
     }
 
@@ -436,6 +454,9 @@ impl Effect {
     /// # Errors
     /// [`EffectError::Element`].
     pub fn fits(&self, array: &Array) -> Result<(), EffectError> {
+        if let Some(draft) = self.definition.draft() {
+            draft.fits(array)?;
+        }
         let last = array.elements() - 1;
         for (parameter, &value) in self.definition.parameters.iter().zip(self.values.iter()) {
             let is_element = value.fract() == 0.0 && (0.0..=last as f64).contains(&value);
@@ -455,7 +476,7 @@ impl Effect {
 
 impl PartialEq for Effect {
     fn eq(&self, other: &Self) -> bool {
-        self.name() == other.name() && self.values == other.values
+        std::ptr::eq(self.definition, other.definition) && self.values == other.values
     }
 }
 

@@ -18,7 +18,7 @@
 //! # Source
 //! The paper's Sec. 2.2: two elements responded to a stimulus of one adjacent element, but not to their own.
 
-use super::{BaseModel, Definition, Make, OnElement, Parameter};
+use super::{Definition, Make, Now, OnElement, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "miswired",
@@ -51,7 +51,7 @@ struct Miswired {
 }
 
 impl OnElement for Miswired {
-    fn signal(&self, _: BaseModel<'_>, input_mm: &[f64], signal_mm: &mut [f64]) {
+    fn signal(&mut self, _: Now<'_>, input_mm: &[f64], signal_mm: &mut [f64]) {
         if let (Some(u), Some(other)) = (signal_mm.get_mut(self.element), input_mm.get(self.answers_for)) {
             *u = self.own_share * *u + self.other_share * other;
         }

@@ -29,7 +29,7 @@
 //! # Source
 //! The compression of an amplifier: C. Rapp, *Effects of HPA-Nonlinearity on a 4-DPSK/OFDM-Signal* (1991).
 
-use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, OnElement, Parameter, Rises};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnElement, Parameter, Rises};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "saturation",
@@ -65,7 +65,7 @@ struct Saturation {
 }
 
 impl OnElement for Saturation {
-    fn signal(&self, _: BaseModel<'_>, _: &[f64], signal_mm: &mut [f64]) {
+    fn signal(&mut self, _: Now<'_>, _: &[f64], signal_mm: &mut [f64]) {
         if self.q > 0.0 {
             for u in signal_mm.iter_mut().filter(|u| **u > 0.0) {
                 *u *= self.bend(*u).powf(-1.0 / self.knee);
@@ -92,7 +92,7 @@ struct FreeSaturation {
 }
 
 impl OnElement for FreeSaturation {
-    fn signal(&self, _: BaseModel<'_>, _: &[f64], signal_mm: &mut [f64]) {
+    fn signal(&mut self, _: Now<'_>, _: &[f64], signal_mm: &mut [f64]) {
         for u in signal_mm.iter_mut().filter(|u| **u > 0.0) {
             *u *= 1.0 - self.lost_share.line(*u);
         }

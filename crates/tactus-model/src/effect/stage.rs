@@ -24,6 +24,10 @@ pub struct Now<'a> {
     pub temperature_c: Option<f64>,
     /// The base model and the covering.
     pub base: BaseModel<'a>,
+    /// The contact, after the effects of motion and contact; `None` before it is known.
+    pub contact: Option<&'a Contact>,
+    /// Signals that reach the elements, in mm, after the effects of the covering; empty before they are known.
+    pub signal_mm: &'a [f64],
 }
 
 /// Position of the tip, registration of the sensor and height of the surface; all in the robot frame.
@@ -97,14 +101,17 @@ pub trait OnCovering: Debug + Send + Sync {
     fn reset(&mut self) {}
 }
 
-/// An effect in the elements; without memory.
+/// An effect in the elements.
 pub trait OnElement: Debug + Send + Sync {
     /// Changes the elements' signals before their response: equivalent indentations in mm, row-major.
     /// `input_mm` is the signal that reached each element, before any effect of this stage.
-    fn signal(&self, _base: BaseModel<'_>, _input_mm: &[f64], _signal_mm: &mut [f64]) {}
+    fn signal(&mut self, _now: Now<'_>, _input_mm: &[f64], _signal_mm: &mut [f64]) {}
 
     /// Changes counts after the response.
     fn counts(&self, _base: BaseModel<'_>, _counts: &mut [f64]) {}
+
+    /// Forgets the past.
+    fn reset(&mut self) {}
 }
 
 /// An effect in the readout.

@@ -5,6 +5,7 @@ use std::fmt;
 use tactus_discover::{Discovery, Level, Verdict};
 
 use super::{
+    draft,
     figures::levels,
     next,
     words::{list, percent},
@@ -18,6 +19,7 @@ use crate::{
 pub(super) fn sections(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     before_and_after(f, found)?;
     unexplained(f, found)?;
+    draft::section(f, found)?;
     next::section(f, found)
 }
 

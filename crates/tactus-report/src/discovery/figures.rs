@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_discover::{Curve, Discovery, ElementGap, FittedCurve, Point};
+use tactus_discover::{Curve, Discovery, DraftedEffect, ElementGap, FittedCurve, Point};
 use tactus_model::Array;
 
 use crate::{
@@ -66,6 +66,25 @@ pub fn free_curve(effect: &str, curve: &FittedCurve) -> Figure {
         .fold(figure, Figure::with)
         .with(Series::bars(bars).width_px(1.2).ink(Ink::Blue))
         .with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label(label))
+}
+
+/// The curve of a draft: its knots with their standard errors, and the law that passes through them.
+pub fn drafted_curve(found: &DraftedEffect) -> Figure {
+    let draft = &found.draft;
+    let covariate = draft.covariates[0];
+    let x = Axis::new(covariate.name(), covariate.unit()).tight();
+    let y = Axis::new(draft.carrier.name(), draft.carrier.unit()).from_zero();
+    let known = || found.knots.iter().filter(|[.., error]| error.is_finite());
+    let bars = known().map(|[at, value, error]| [*at, value - error, value + error]);
+    let dots = found.knots.iter().map(|[at, value, _]| [*at, *value]).collect();
+    let [from, to] = draft.ranges[0];
+    let places = (0..=60).map(|step| from + (to - from) * f64::from(step) / 60.0);
+    let line = Series::line(places.map(|at| [at, draft.law.value(&[at])]).collect());
+    Figure::new(format!("Curve of {}", draft.name), x, y)
+        .size_px(CURVE_PX)
+        .with(line.ink(Ink::Muted).label(draft.law.name()))
+        .with(Series::bars(bars).width_px(1.2).ink(Ink::Blue))
+        .with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label("knots"))
 }
 
 /// Root mean square residual of each element, of the base model and, if different, of the grown model, on one scale: in

@@ -6,11 +6,15 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tactus_discover::{
-    AddedEffect, Contest, Curve, Discovery, Estimated, FaultyElement, FittedCurve, FittedKnot, Floor, Gap,
-    GlobalTest, Inclusion, LeftOut, Level, NextExperiment, OpenQuestion, Rivalry, Round, Structured,
-    TriedEffect,
+    AddedEffect, Contest, Curve, Discovery, DraftedEffect, Estimated, FaultyElement, FittedCurve, FittedKnot,
+    Floor, Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NoDraft, OpenQuestion, Rivalry, Round,
+    Structured, TriedEffect,
 };
+use tactus_model::Covariate;
+use tactus_model::effect::{Draft, Law};
+use tactus_schema::draft::stage_name;
 
+use super::draft::status;
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
 
 /// Name of the form of `report.json`.
@@ -57,6 +61,7 @@ struct ReportJson<'a> {
     verdict: &'static str,
     verdict_text: String,
     unexplained: UnexplainedJson<'a>,
+    draft: Option<DraftJson<'a>>,
     next_experiments: Vec<NextExperimentJson<'a>>,
     open_questions: Vec<OpenQuestionJson<'a>>,
     left_out: Vec<LeftOutJson<'a>>,
@@ -271,6 +276,44 @@ struct UnexplainedJson<'a> {
     share: f64,
 }
 
+/// The draft, or why there is none.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum DraftJson<'a> {
+    Found(Box<DraftedJson<'a>>),
+    None { none_because: String },
+}
+
+#[derive(Serialize)]
+struct DraftedJson<'a> {
+    name: &'a str,
+    status: &'static str,
+    sentence: &'a str,
+    stage: &'static str,
+    carrier: &'static str,
+    when: &'static str,
+    covariates: Vec<GapPlaceJson<'a>>,
+    law: &'static str,
+    numbers: BTreeMap<&'static str, f64>,
+    at: Option<&'a [Vec<f64>]>,
+    values: Option<&'a [f64]>,
+    weights: Option<&'a [f64]>,
+    knots: Vec<KnotJson>,
+    p_value: f64,
+    ln_odds: f64,
+    folds: usize,
+    nearest: Vec<NearestJson<'a>>,
+    closed_share: Option<f64>,
+    heldout_rms_before: f64,
+    heldout_rms_after: f64,
+}
+
+#[derive(Serialize)]
+struct NearestJson<'a> {
+    effect: &'a str,
+    ln_odds_behind: f64,
+}
+
 #[derive(Serialize)]
 struct NextExperimentJson<'a> {
     experiment: &'a str,
@@ -364,6 +407,7 @@ impl<'a> ReportJson<'a> {
                 depends_on: &found.unexplained.depends_on,
                 share: found.unexplained.share,
             },
+            draft: found.draft.as_ref().map(DraftJson::of),
             next_experiments: found.plan.next.iter().map(NextExperimentJson::of).collect(),
             open_questions: found.plan.open.iter().map(OpenQuestionJson::of).collect(),
             left_out: found.plan.left_out.iter().map(LeftOutJson::of).collect(),
@@ -371,6 +415,68 @@ impl<'a> ReportJson<'a> {
             active_ended: report.active_ended,
         }
     }
+}
+
+impl<'a> DraftJson<'a> {
+    fn of(draft: &'a Result<Box<DraftedEffect>, NoDraft>) -> Self {
+        match draft {
+            Ok(found) => Self::Found(Box::new(DraftedJson::of(found))),
+            Err(none) => Self::None { none_because: none.in_words() },
+        }
+    }
+}
+
+impl<'a> DraftedJson<'a> {
+    fn of(found: &'a DraftedEffect) -> Self {
+        let draft = &found.draft;
+        let (at, values) = match &draft.law {
+            Law::Table { at, values } => (Some(at.as_slice()), Some(values.as_slice())),
+            _ => (None, None),
+        };
+        let place = |(covariate, range): (&Covariate, &[f64; 2])| GapPlaceJson {
+            covariate: covariate.name(),
+            unit: covariate.unit(),
+            range: *range,
+        };
+        let formula = |at: f64| at_knots(draft).then(|| draft.law.value(&[at]));
+        let knot = |[at, value, se]: &[f64; 3]| KnotJson {
+            at: *at,
+            value: *value,
+            se: Some(*se).filter(|se| se.is_finite()),
+            formula: formula(*at),
+        };
+        Self {
+            name: &draft.name,
+            status: status(found).name(),
+            sentence: &draft.sentence,
+            stage: stage_name(draft.stage()),
+            carrier: draft.carrier.name(),
+            when: draft.when.name(),
+            covariates: draft.covariates.iter().zip(&draft.ranges).map(place).collect(),
+            law: draft.law.name(),
+            numbers: draft.law.numbers().into_iter().collect(),
+            at,
+            values,
+            weights: draft.weights.as_deref(),
+            knots: found.knots.iter().map(knot).collect(),
+            p_value: found.p_value,
+            ln_odds: found.ln_odds,
+            folds: found.folds,
+            nearest: found
+                .nearest
+                .iter()
+                .map(|(effect, behind)| NearestJson { effect, ln_odds_behind: *behind })
+                .collect(),
+            closed_share: found.closed_share,
+            heldout_rms_before: found.heldout_rms_before_counts,
+            heldout_rms_after: found.heldout_rms_after_counts,
+        }
+    }
+}
+
+/// True if a law passes through the knots of the draft's curve.
+fn at_knots(draft: &Draft) -> bool {
+    !matches!(draft.law, Law::Table { .. })
 }
 
 impl<'a> SourceJson<'a> {

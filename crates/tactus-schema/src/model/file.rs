@@ -10,6 +10,7 @@ use super::{BaseModel, Evidence, KnownEffect, Model, ModelFileError};
 use crate::description::{
     OneOrEach, RawArray, RawIndenter, WrongField, check_schema, not_negative, positive, wrong,
 };
+use crate::draft::RawDraft;
 
 /// The schema's name in the file.
 pub const SCHEMA: &str = "tactus.model/1";
@@ -76,6 +77,9 @@ struct RawEffect {
     standard_errors: BTreeMap<String, f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     evidence: Option<RawEvidence>,
+    /// What it is, if the library does not name it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    draft: Option<RawDraft>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -221,13 +225,27 @@ impl RawEffect {
                 heldout_rms_before_counts: evidence.heldout_rms_before_counts,
                 heldout_rms_after_counts: evidence.heldout_rms_after_counts,
             }),
+            draft: known.effect.definition().draft().map(RawDraft::of),
         }
     }
 
     fn check(self, index: usize, array: &Array) -> Result<KnownEffect, ModelFileError> {
         let wrong_effect = |source| ModelFileError::Effect { index, source };
         let parameters = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
-        let definition = Definition::find(&self.name).map_err(wrong_effect)?;
+        let definition = match self.draft {
+            None => Definition::find(&self.name),
+            Some(raw) => {
+                let field = format!("effect[{index}].draft");
+                let draft = raw.check(&field)?;
+                if draft.name != self.name {
+                    return Err(
+                        wrong(format!("{field}.name"), format!("must be {:?} here", self.name)).into()
+                    );
+                }
+                draft.define()
+            }
+        }
+        .map_err(wrong_effect)?;
         let knots = self.knots.as_ref().map(|raw| knots(raw, index, definition)).transpose()?;
         let mut tables = BTreeMap::new();
         for (name, raw) in &self.tables {

@@ -1,6 +1,7 @@
 //! `discover`: finds what a model is missing; writes a report, its numbers, the grown model and the residuals.
 
 mod active;
+mod library;
 mod measurements;
 mod model;
 mod print;
@@ -15,7 +16,11 @@ use std::thread;
 use anyhow::{Context, anyhow, bail};
 use tactus_discover::{DiscoverError, Discovery, Known, Options, Rule};
 use tactus_model::Array;
-use tactus_report::discovery::{ActiveRun, DiscoveryReport, discovery_html, discovery_json};
+use tactus_model::effect::Definition;
+use tactus_report::discovery::{
+    ActiveRun, DataSource, DiscoveryReport, discovery_html, discovery_json, draft_status,
+};
+use tactus_schema::draft::{DraftEvidence, DraftFile, Nearest};
 use tactus_schema::{Model, Rig};
 
 use crate::cli::{Ablation, Common, DiscoverArgs};
@@ -68,8 +73,9 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     progress.show("writing", 1.0);
     discovered.write(folder.path())?;
     folder.finish()?;
-    let paths = FILES.map(|name| std::path::absolute(args.out.join(name)));
-    let paths = paths.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let draft = discovered.draft()?.map(|(name, _)| name);
+    let names = FILES.into_iter().chain(draft.as_deref());
+    let paths = names.map(|name| std::path::absolute(args.out.join(name))).collect::<Result<Vec<_>, _>>()?;
     progress.clear();
     if common.json {
         output::write(&discovery_json(&discovered.report()))?;
@@ -102,7 +108,8 @@ fn analysed(
             Model::of_rig(&measured.rig).context("the rig's reference indenter is not among its tools")?
         }
     };
-    let known = known(&measured.rig, &model);
+    let drafts = args.library.as_deref().map(library::read).transpose()?.unwrap_or_default();
+    let known = known(&measured.rig, &model, &drafts);
     let threads = args.threads.map_or_else(cores, usize::from);
     let rule = match args.ablation {
         None => Rule::Protocol,
@@ -135,7 +142,35 @@ impl Discovered {
         for (path, text) in [html, json, model].iter().zip(texts) {
             fs::write(path, text).with_context(|| path.display().to_string())?;
         }
+        if let Some((name, text)) = self.draft()? {
+            let path = folder.join(name);
+            fs::write(&path, text).with_context(|| path.display().to_string())?;
+        }
         residuals::write(self, &residuals)
+    }
+
+    /// Name and text of the draft's file, if there is a draft.
+    fn draft(&self) -> anyhow::Result<Option<(String, String)>> {
+        let Some(Ok(found)) = &self.discovery.draft else { return Ok(None) };
+        let hash = |source: &DataSource| (source.id.clone(), source.sha256.clone());
+        let nearest = found.nearest.iter();
+        let file = DraftFile {
+            draft: found.draft.clone(),
+            status: draft_status(found),
+            covariance: found.covariance.clone(),
+            nearest: nearest
+                .map(|(class, behind)| Nearest { class: (*class).to_owned(), ln_odds_behind: *behind })
+                .collect(),
+            evidence: Some(DraftEvidence {
+                data: self.measured.data.iter().map(hash).collect(),
+                seed: self.discovery.seed,
+                p_value: found.p_value,
+                ln_odds: found.ln_odds,
+                folds: u32::try_from(found.folds)?,
+                closed_share: found.closed_share,
+            }),
+        };
+        Ok(Some((format!("{}.toml", found.draft.name), file.to_toml().context("the draft")?)))
     }
 
     fn report(&self) -> DiscoveryReport<'_> {
@@ -188,7 +223,7 @@ fn described(array: &Array) -> String {
     )
 }
 
-fn known(rig: &Rig, model: &Model) -> Known {
+fn known(rig: &Rig, model: &Model, drafts: &[&'static Definition]) -> Known {
     Known {
         array: rig.array.clone(),
         psf: model.base.psf,
@@ -196,6 +231,7 @@ fn known(rig: &Rig, model: &Model) -> Known {
         registration: rig.registration,
         indenters: rig.indenters.clone(),
         effects: model.effects.iter().map(|known| known.effect.clone()).collect(),
+        drafts: drafts.to_vec(),
     }
 }
 

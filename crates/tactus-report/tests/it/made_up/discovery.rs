@@ -102,6 +102,7 @@ pub(crate) fn explained() -> Discovery {
         ],
         final_: Final { level: level(2.08), shrink: Some(0.996_1) },
         verdict: Verdict::Explained,
+        draft: None,
         unexplained: Unexplained { depends_on: vec![], share: 0.003_9 },
         plan: plan(),
         recalibrated: base(),

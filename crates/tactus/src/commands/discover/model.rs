@@ -1,16 +1,22 @@
 //! The grown model of a discovery.
 
-use tactus_discover::{AddedEffect, Discovery, Estimated};
+use tactus_discover::{AddedEffect, Discovery, DraftedEffect, Estimated};
 use tactus_model::Effect;
 use tactus_schema::Model;
 use tactus_schema::model::{BaseModel, Evidence, KnownEffect};
 
-/// The model with the discovered effects, base and effects fitted jointly. Added effects have standard errors and name
+/// The model with the discovered effects and the draft of what they leave, base and effects fitted jointly. Added effects have standard errors and name
 /// their data; effects known before keep their evidence.
 pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
-    let base = BaseModel::of(before.base.array.clone(), found.grown.psf, found.grown.response.clone());
+    let draft = found.draft.as_ref().and_then(|draft| draft.as_ref().ok());
+    let (of_found, of_effects) =
+        draft.map_or((&found.grown, &found.effects), |draft| (&draft.base, &draft.effects));
+    let base = BaseModel::of(before.base.array.clone(), of_found.psf, of_found.response.clone());
     let noise_rms_counts = found.floor.rms_counts().unwrap_or(before.base.noise_rms_counts);
-    let effects = found.effects.iter().enumerate().map(|(nth, effect)| {
+    let effects = of_effects.iter().enumerate().map(|(nth, effect)| {
+        if let Some(draft) = draft.filter(|draft| draft.draft.name == effect.name()) {
+            return drafted(draft, effect, data);
+        }
         let added = found.steps.iter().find_map(|step| Some((step, term(step, effect)?)));
         // A random walk of each element is one step with many effects.
         let is_part = |step: &&AddedEffect| nth >= before.effects.len() && step.effect == effect.name();
@@ -36,6 +42,19 @@ pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
         }
     });
     Model { effects: effects.collect(), base: BaseModel { noise_rms_counts, ..base } }
+}
+
+/// A draft in a model, with what it closes.
+fn drafted(draft: &DraftedEffect, effect: &Effect, data: &str) -> KnownEffect {
+    KnownEffect {
+        effect: effect.clone(),
+        standard_errors: [].into(),
+        evidence: Some(Evidence {
+            data: data.to_owned(),
+            heldout_rms_before_counts: draft.heldout_rms_before_counts,
+            heldout_rms_after_counts: draft.heldout_rms_after_counts,
+        }),
+    }
 }
 
 /// The term of a step that belongs to this effect.

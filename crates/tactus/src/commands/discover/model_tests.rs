@@ -90,6 +90,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
         }],
         final_: Final { level, shrink: Some(1.0) },
         verdict: Verdict::Explained,
+        draft: None,
         unexplained: Unexplained { depends_on: Vec::new(), share: 0.0 },
         plan: Plan::default(),
         recalibrated: base,

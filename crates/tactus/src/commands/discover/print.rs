@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use tactus_calibrate::Estimate;
-use tactus_discover::{AddedEffect, Estimated, FittedCurve, Level};
+use tactus_discover::{AddedEffect, DraftedEffect, Estimated, FittedCurve, Level};
 use tactus_report::discovery::{
-    AmbiguousEffect, DiscoveryReport, Proposal, command, in_words, not_proposed, not_shown, proposals,
+    AmbiguousEffect, DiscoveryReport, Proposal, command, draft_status, in_words, not_proposed, not_shown,
+    proposals,
 };
 
 use crate::commands::calibrate::{estimate, faulty};
@@ -43,6 +44,11 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
     }
     say("");
     say(&in_words(found));
+    match &found.draft {
+        Some(Ok(draft)) => say(&drafted(draft)),
+        Some(Err(none)) => say(&format!("No effect was drafted of what is left: {}.", none.in_words())),
+        None => {}
+    }
     for run in report.active {
         let [before, after] = [&run.before, &run.after].map(|undecided| AmbiguousEffect::in_words(undecided));
         say(&format!("{}: {before} -> {after}", command(&run.experiment, &run.parameters)));
@@ -167,6 +173,16 @@ fn parameter(parameter: &Estimated) -> String {
 
 fn probability(value: f64) -> String {
     if value < 1e-4 { "< 0.0001".into() } else { format!("{value:.4}") }
+}
+
+/// A draft in two sentences.
+fn drafted(found: &DraftedEffect) -> String {
+    let closes = found.closed_share.map_or_else(
+        || "Nothing is left on held-out presses".to_owned(),
+        |share| format!("On held-out presses it closes {:.0} % of what was left", 100.0 * share),
+    );
+    let DraftedEffect { draft, .. } = found;
+    format!("Drafted {} ({}): {}. {closes}.", draft.name, draft_status(found).name(), draft.sentence)
 }
 
 #[cfg(test)]

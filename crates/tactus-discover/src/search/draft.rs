@@ -1,0 +1,363 @@
+//! Drafts of what no class explains: a search in a small grammar.
+//!
+//! A draft is a [`tactus_model::effect::Draft`]: a carrier, when it acts, a curve of one covariate or two, and a weight for each element or
+//! none. The [`grammar`] lists them. At a model, one pass gives the products of all with the residual, knot by knot of their curves, and a
+//! test by flipped signs says whether noise would give as much to any of them. A second pass weighs those that come first by their
+//! evidence, as classes are weighed. The best one is then tried with a second covariate. Its curve becomes a law, if one passes through its
+//! knots ([`curves`]), and is fitted once more as the effect that the draft is.
+//!
+//! The columns are those of the draft itself: a constant draft gives what one unit of each carrier does, and the covariates are those that
+//! the draft will see in a simulation ([`sight`]).
+//!
+//! Held-out presses take no part.
+
+mod curves;
+mod grammar;
+mod sight;
+mod words;
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use tactus_model::effect::Draft;
+
+use self::grammar::Atom;
+use self::sight::Sight;
+use super::evidence::{Addition, Evidence, Gain, Signs, excused};
+use super::grow::{ALPHA, FLIPS, POLISH_ROUNDS, Search};
+use super::score::{Score, flipped, largest, p_value};
+use crate::data::DiscoverError;
+use crate::fit::{Fitted, Free, Grams, Term};
+use crate::numbers::parallel;
+
+/// Atoms that are weighed by their evidence.
+const WEIGHED_MAX: usize = 12;
+/// Second covariates that are tried beside the best one.
+const SECONDS_MAX: usize = 12;
+/// Knots of the curve of a single covariate, and for each of two.
+const KNOTS: usize = 7;
+const KNOTS_OF_TWO: usize = 4;
+/// Folds of blocks in which the same atom should come first.
+const FOLDS: usize = 5;
+/// Logarithm of the odds by which a draft must be ahead of every class.
+const AHEAD_LN_ODDS: f64 = 5.0;
+/// Least part of a draft that recalibration and the model do not take up.
+const OWN_LEAST: f64 = 0.3;
+/// In so many folds the same atom must come first.
+const FOLDS_LEAST: usize = 4;
+/// Changes the seed, so that drafts have other sign flips than classes and covariates.
+const STREAM: u64 = 0x000d_4af7;
+
+/// A draft that passed the gates, and the model with it.
+pub(crate) struct Drafted {
+    pub(crate) draft: Draft,
+    /// The grown model with the draft as its last term, of strength 1.
+    pub(crate) at: Fitted,
+    /// Covariance of the law's numbers, or of the table's values.
+    pub(crate) covariance: Vec<Vec<f64>>,
+    /// The curve's knots with their standard errors, as they were before a law passed through them; of a single covariate.
+    pub(crate) knots: Vec<[f64; 3]>,
+    /// Probability that noise gives as much to any draft of the grammar.
+    pub(crate) p_value: f64,
+    /// Logarithm of its odds against none.
+    pub(crate) ln_odds: f64,
+    /// In how many of five folds it came first.
+    pub(crate) folds: usize,
+    /// The classes that come nearest, with by how much each is behind.
+    pub(crate) nearest: Vec<(&'static str, f64)>,
+}
+
+/// Why there is no draft.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum NoDraft {
+    /// Noise would give as much to some draft.
+    Noise,
+    /// A class of the library explains nearly as much: its name.
+    Class(&'static str),
+    /// Folds of the presses prefer different drafts.
+    Unsteady,
+    /// Recalibration takes up most of it.
+    TakenUp,
+    /// As an effect it gains too little.
+    NoGain,
+}
+
+impl NoDraft {
+    /// The reason in words.
+    pub fn in_words(&self) -> String {
+        match self {
+            Self::Noise => "noise would give as much to some draft of the grammar".into(),
+            Self::Class(class) => format!("{class} of the library explains nearly as much"),
+            Self::Unsteady => "different parts of the data prefer different drafts".into(),
+            Self::TakenUp => "recalibration takes up most of what it would explain".into(),
+            Self::NoGain => "as an effect it explains too little".into(),
+        }
+    }
+}
+
+/// The outcome of drafting.
+pub(crate) type Outcome = Result<Box<Drafted>, NoDraft>;
+
+/// An atom with its columns in a pass.
+struct Weighed {
+    atom: Atom,
+    directions: Vec<usize>,
+}
+
+impl Search<'_> {
+    /// Drafts what a model leaves.
+    pub(crate) fn draft(&self, at: &Fitted, number: usize) -> Result<Outcome, DiscoverError> {
+        let sight = Arc::new(Sight::of(self.problem, at)?);
+        (self.progress)("drafting what nobody has named", 0.0);
+        let atoms = grammar::atoms(self.problem, at, &sight, self.rounds);
+        let count = atoms.len() as f64;
+        let (p_value, first) = self.screened(at, &sight, atoms)?;
+        if p_value > ALPHA {
+            return Ok(Err(NoDraft::Noise));
+        }
+        let (weighed, grams) = self.products(at, &sight, first)?;
+        let additions = additions(&weighed, &grams, count);
+        let evidence = self.evidence_of(&additions, grams.reduced());
+        let ranked = ranked(&evidence);
+        let Some((best, ln_odds)) = ranked.first().copied() else { return Ok(Err(NoDraft::NoGain)) };
+        let folds = self.folds(&additions, &weighed, &grams, best);
+        if folds < FOLDS_LEAST {
+            return Ok(Err(NoDraft::Unsteady));
+        }
+        let nearest = self.nearest(at, ln_odds)?;
+        if let Some((class, _)) = nearest.first().filter(|(_, behind)| *behind < AHEAD_LN_ODDS) {
+            return Ok(Err(NoDraft::Class(class)));
+        }
+        let best = self.with_second(at, &sight, &weighed[best].atom, ln_odds, count)?;
+        let Some(mut drafted) = self.fitted_draft(at, &sight, best, number)? else {
+            return Ok(Err(NoDraft::NoGain));
+        };
+        if self.own_share(at, &drafted.at)? < OWN_LEAST {
+            return Ok(Err(NoDraft::TakenUp));
+        }
+        drafted.ln_odds = self.ln_odds(at, &drafted.at);
+        if drafted.ln_odds < AHEAD_LN_ODDS {
+            return Ok(Err(NoDraft::NoGain));
+        }
+        (drafted.p_value, drafted.folds, drafted.nearest) = (p_value, folds, nearest);
+        Ok(Ok(Box::new(drafted)))
+    }
+
+    /// Probability that noise gives as much to any atom, and the atoms that come first.
+    fn screened(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atoms: Vec<Atom>,
+    ) -> Result<(f64, Vec<Atom>), DiscoverError> {
+        let mut directions = Vec::new();
+        let mut of_atoms: Vec<Range<usize>> = Vec::new();
+        for atom in &atoms {
+            let first = directions.len();
+            directions.extend(sight.columns(atom));
+            of_atoms.push(first..directions.len());
+        }
+        let grams = self.problem.grams_of_each(at, directions)?;
+        let score = |(atom, own): &(&Atom, &Range<usize>)| -> Vec<Score> {
+            let is_there =
+                |one: &usize| grams.size(*one) > 1e-3 * grams.whole(*one) && grams.size(*one) > 0.0;
+            let of_each = (*own).clone().filter(is_there);
+            of_each.map(|one| Score::of_grams(&grams, &[one]).picked_from(atom.among)).collect()
+        };
+        let pairs: Vec<(&Atom, &Range<usize>)> = atoms.iter().zip(&of_atoms).collect();
+        let scores: Vec<Vec<Score>> = parallel::map(&pairs, score);
+        let groups: Vec<Vec<&Score>> = scores.iter().map(|of| of.iter().collect()).collect();
+        let under_none = largest(&flipped(&groups, FLIPS, self.options.seed ^ STREAM));
+        let statistic = scores.iter().flatten().map(|score| score.z).fold(0.0, f64::max);
+        // Hats overlap, in all atoms alike.
+        let strength = |scores: &[Score]| -> f64 {
+            scores.iter().map(|score| score.z * score.z).sum::<f64>() - scores.len() as f64
+        };
+        let mut order: Vec<usize> = (0..atoms.len()).filter(|atom| !scores[*atom].is_empty()).collect();
+        order.sort_by(|a, b| strength(&scores[*b]).total_cmp(&strength(&scores[*a])));
+        order.truncate(WEIGHED_MAX);
+        let first = order.into_iter().map(|place| {
+            let atom = atoms[place].clone();
+            if atom.of_elements { sight.with_curve(atom, &grams, of_atoms[place].clone()) } else { atom }
+        });
+        Ok((p_value(statistic, &under_none), first.collect()))
+    }
+
+    /// The products of atoms.
+    fn products(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atoms: Vec<Atom>,
+    ) -> Result<(Vec<Weighed>, Grams), DiscoverError> {
+        let mut directions = Vec::new();
+        let mut weighed = Vec::new();
+        for atom in atoms {
+            let first = directions.len();
+            directions.extend(sight.columns(&atom));
+            weighed.push(Weighed { atom, directions: (first..directions.len()).collect() });
+        }
+        Ok((weighed, self.problem.grams(at, directions)?))
+    }
+
+    fn evidence_of<'a>(&self, additions: &'a [Addition], products: &'a DMatrix<f64>) -> Evidence<'a> {
+        Evidence { additions, products, variance: self.problem.variance, present: &[] }
+    }
+
+    /// In how many folds of blocks the best atom comes first: of those not in the fold, whose products with the residual are summed.
+    fn folds(&self, additions: &[Addition], weighed: &[Weighed], grams: &Grams, best: usize) -> usize {
+        let blocks = grams.along(0).len();
+        let first_in = |fold: &usize| {
+            let is_other = |(block, _): &(usize, &f64)| block % FOLDS != *fold;
+            let share =
+                (0..blocks).filter(|block| block % FOLDS != *fold).count() as f64 / blocks.max(1) as f64;
+            let mut products = grams.reduced() * share;
+            let last = products.nrows() - 1;
+            for direction in 0..last {
+                let wanted: f64 =
+                    grams.along(direction).iter().enumerate().filter(is_other).map(|(_, one)| one).sum();
+                products[(direction, last)] = wanted;
+                products[(last, direction)] = wanted;
+            }
+            ranked(&self.evidence_of(additions, &products))
+                .first()
+                .is_some_and(|(first, _)| weighed[*first].atom.is_like(&weighed[best].atom))
+        };
+        (0..FOLDS).filter(first_in).count()
+    }
+
+    /// The classes whose first step comes nearest, with by how much each is behind a draft of these odds.
+    fn nearest(&self, at: &Fitted, ln_odds: f64) -> Result<Vec<(&'static str, f64)>, DiscoverError> {
+        let pass = self.pass(at)?;
+        let evidence = pass.evidence();
+        let best = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), f64::NEG_INFINITY);
+        let gain =
+            |(addition, gain): &(usize, Gain)| (pass.class_of(*addition), ln_odds - gain.ln_odds.max(0.0));
+        Ok(best.iter().map(gain).take(3).collect())
+    }
+
+    /// The atom with a second covariate, if one gains more than a form is excused for; else as it is.
+    fn with_second(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        best: &Atom,
+        ln_odds: f64,
+        count: f64,
+    ) -> Result<Atom, DiscoverError> {
+        let seconds: Vec<Atom> = grammar::with_seconds(best, sight).collect();
+        let mut found = (ln_odds + excused(ln_odds), best.clone());
+        for some in seconds.chunks(SECONDS_MAX) {
+            let (weighed, grams) = self.products(at, sight, some.to_vec())?;
+            let additions = additions(&weighed, &grams, count * seconds.len() as f64);
+            let first = ranked(&self.evidence_of(&additions, grams.reduced())).into_iter().next();
+            if let Some((place, of_both)) = first.filter(|(_, of_both)| *of_both > found.0) {
+                found = (of_both, weighed[place].atom.clone());
+            }
+        }
+        Ok(found.1)
+    }
+
+    /// The atom's curve, as a law or a table, fitted as an effect; `None` if it gains nothing.
+    fn fitted_draft(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atom: Atom,
+        number: usize,
+    ) -> Result<Option<Drafted>, DiscoverError> {
+        let atom = if atom.of_elements { self.with_weights(at, sight, atom)? } else { atom };
+        let curve = self.curve(at, sight, &atom)?;
+        let reduced = curves::reduced(&atom, &curve, excused(0.5 * curve.squares()));
+        let draft = words::named(sight, &atom, reduced.law, number);
+        Ok(self.taken(at, draft)?.map(|(draft, fitted)| Drafted {
+            draft,
+            at: fitted,
+            covariance: reduced.covariance,
+            knots: reduced.knots,
+            p_value: 1.0,
+            ln_odds: 0.0,
+            folds: 0,
+            nearest: Vec::new(),
+        }))
+    }
+
+    /// The coefficients of an atom's columns with the greatest posterior probability.
+    fn curve(&self, at: &Fitted, sight: &Arc<Sight>, atom: &Atom) -> Result<curves::Curve, DiscoverError> {
+        let (weighed, grams) = self.products(at, sight, vec![atom.clone()])?;
+        let additions = additions(&weighed, &grams, 1.0);
+        let evidence = self.evidence_of(&additions, grams.reduced());
+        let found: BTreeMap<usize, f64> = evidence.coefficients(&evidence.set([0])).into_iter().collect();
+        let directions = &additions[0].directions;
+        let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
+        let product = |i: usize, j: usize| grams.reduced()[(directions[i], directions[j])];
+        Ok(curves::Curve {
+            values: DVector::from_iterator(directions.len(), directions.iter().map(value)),
+            gram: DMatrix::from_fn(directions.len(), directions.len(), product) / self.problem.variance,
+        })
+    }
+
+    /// An atom of single elements with the weight of each; the largest is 1.
+    fn with_weights(&self, at: &Fitted, sight: &Arc<Sight>, atom: Atom) -> Result<Atom, DiscoverError> {
+        let weights = self.curve(at, sight, &atom)?.values;
+        let most = weights.iter().fold(f64::MIN_POSITIVE, |most: f64, one| most.max(one.abs()));
+        let weights = Arc::new(weights.iter().map(|one| one / most).collect());
+        Ok(Atom { weights: Some(weights), of_elements: false, curve: None, ..atom })
+    }
+
+    /// The draft as a term of the model, with its law scaled so that its strength is 1; `None` if it does not come nearer to the data.
+    fn taken(&self, at: &Fitted, draft: Draft) -> Result<Option<(Draft, Fitted)>, DiscoverError> {
+        let term = Term { values: vec![1.0], ..Term::neutral(draft.clone().define()?) };
+        let fitted = self.problem.fit_from(at.parameters.with(term), POLISH_ROUNDS)?;
+        let strength = fitted.parameters.terms.last().map_or(0.0, |term| term.values[0]);
+        if strength <= 0.0 || fitted.cost >= at.cost {
+            return Ok(None);
+        }
+        let scaled = Draft { law: curves::scaled(&draft.law, strength), ..draft };
+        // The prediction is the same: a draft is its strength times its law.
+        let mut parameters = fitted.parameters;
+        if let Some(last) = parameters.terms.last_mut() {
+            *last = Term { values: vec![1.0], ..Term::neutral(scaled.clone().define()?) };
+        }
+        let mut errors = fitted.errors;
+        errors.last_mut().into_iter().flatten().for_each(|error| *error /= strength);
+        Ok(Some((scaled, Fitted { parameters, errors, ..fitted })))
+    }
+
+    /// How much of a draft, the last term of a model, is not taken up by recalibration and the other terms.
+    fn own_share(&self, at: &Fitted, with: &Fitted) -> Result<f64, DiscoverError> {
+        let Some(term) = with.parameters.terms.last() else { return Ok(0.0) };
+        let start = at.parameters.with(Term::neutral(term.definition));
+        let direction = self.problem.towards(&start, Free::Of { term: start.terms.len() - 1, parameter: 0 });
+        let grams = self.problem.grams(at, vec![direction])?;
+        Ok(grams.size(0) / grams.whole(0).max(f64::MIN_POSITIVE))
+    }
+}
+
+/// The atoms as additions, each a class of its own.
+fn additions(weighed: &[Weighed], grams: &Grams, count: f64) -> Vec<Addition> {
+    let last = grams.reduced().nrows() - 1;
+    let residual = grams.reduced()[(last, last)].sqrt();
+    // As an atom has no range: what would make the whole residual.
+    let width = |one: &usize| residual / grams.whole(*one).max(f64::MIN_POSITIVE);
+    let of = |(class, one): (usize, &Weighed)| Addition {
+        class,
+        directions: one.directions.clone(),
+        widths: one.directions.iter().map(width).collect(),
+        signs: vec![Signs::Both; one.directions.len()],
+        among: count * one.atom.among,
+        is_free: false,
+    };
+    weighed.iter().enumerate().map(of).collect()
+}
+
+/// The additions with the logarithm of their odds, greatest first.
+fn ranked(evidence: &Evidence<'_>) -> Vec<(usize, f64)> {
+    let numbers: Vec<usize> = (0..evidence.additions.len()).collect();
+    let odds = parallel::map(&numbers, |one| evidence.gain_alone(*one).ln_odds);
+    let mut ranked: Vec<(usize, f64)> = numbers.into_iter().zip(odds).collect();
+    ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+    ranked
+}

@@ -1,0 +1,173 @@
+//! Curves and laws: which formula passes through a curve's knots.
+//!
+//! A curve has a value at each knot, and the products of its columns say how much of the likelihood a step away from them costs:
+//!
+//! ```text
+//! cost(v) = (v - best)' H (v - best)          in units of the noise's variance
+//! ```
+//!
+//! A law is a formula with one shape, such as an exponential with its length, and a scale. For each shape the scale follows from least squares
+//! under `H`. What recalibration takes up, such as a constant share of the own signal, costs nothing, so each law may have a constant beside
+//! it in the fit, which is dropped where that costs nothing. A curve becomes the law that costs least if that is less than a form is excused
+//! for; else it stays a table.
+
+use nalgebra::{DMatrix, DVector};
+use tactus_model::effect::Law;
+
+use super::grammar::Atom;
+
+/// Shapes that are tried between the least and the greatest length of a law.
+const SHAPES: usize = 60;
+/// A constant beside a law is dropped if that costs less.
+const FREE_COST: f64 = 1.0;
+/// A prior so wide that it only keeps what the data do not show at 0.
+const RIDGE: f64 = 1e-9;
+
+/// A fitted curve.
+pub(super) struct Curve {
+    /// At each knot.
+    pub(super) values: DVector<f64>,
+    /// The products of the columns, in units of the noise's variance.
+    pub(super) gram: DMatrix<f64>,
+}
+
+/// A curve as a law or a table.
+pub(super) struct Reduced {
+    pub(super) law: Law,
+    pub(super) covariance: Vec<Vec<f64>>,
+    /// Place, value and standard error of the knots; of a single covariate.
+    pub(super) knots: Vec<[f64; 3]>,
+}
+
+/// A law of one covariate, up to its scale.
+type Kind = fn(scale: f64, shape: f64) -> Law;
+
+impl Curve {
+    /// What the curve explains, in units of the noise's variance.
+    pub(super) fn squares(&self) -> f64 {
+        self.values.dot(&(&self.gram * &self.values))
+    }
+
+    /// What it costs to have other values.
+    fn cost(&self, values: &DVector<f64>) -> f64 {
+        let step = values - &self.values;
+        step.dot(&(&self.gram * &step))
+    }
+
+    /// Covariance of linear combinations of columns.
+    fn covariance(&self, columns: &DMatrix<f64>) -> Vec<Vec<f64>> {
+        let products = columns.transpose() * &self.gram * columns;
+        let size = products.nrows();
+        let most = (0..size).map(|i| products[(i, i)]).fold(0.0, f64::max);
+        let held = products + DMatrix::identity(size, size) * (RIDGE * most);
+        let Some(inverse) = held.try_inverse() else { return Vec::new() };
+        inverse.row_iter().map(|row| row.iter().copied().collect()).collect()
+    }
+}
+
+/// The curve as the law that costs least, if that is at most `excused` nats; else as a table.
+pub(super) fn reduced(atom: &Atom, curve: &Curve, excused: f64) -> Reduced {
+    let count = curve.values.len();
+    let all = curve.covariance(&DMatrix::identity(count, count));
+    if let Some(per_unit) = atom.per_unit {
+        let law = Law::Periodic { offset: 0.0, sine: curve.values[0], cosine: curve.values[1], per_unit };
+        return Reduced { law, covariance: all, knots: Vec::new() };
+    }
+    let [places] = atom.knots.as_slice() else {
+        let law = Law::Table { at: atom.knots.clone(), values: curve.values.iter().copied().collect() };
+        return Reduced { law, covariance: all, knots: Vec::new() };
+    };
+    let error = |knot: usize| all.get(knot).map_or(f64::NAN, |row| row[knot].sqrt());
+    let knots =
+        places.iter().zip(curve.values.iter()).enumerate().map(|(knot, (at, v))| [*at, *v, error(knot)]);
+    let knots = knots.collect();
+    let best =
+        candidates(places).filter_map(|kind| fitted(places, curve, &kind)).min_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((_, law, columns)) = best.filter(|(cost, ..)| 0.5 * cost <= excused) {
+        return Reduced { covariance: curve.covariance(&columns), law, knots };
+    }
+    let law = Law::Table { at: vec![places.clone()], values: curve.values.iter().copied().collect() };
+    Reduced { law, covariance: all, knots }
+}
+
+/// Laws with a shape, for covariates with these knots. A straight line comes first: of laws that cost the same the first is taken.
+fn candidates(places: &[f64]) -> impl Iterator<Item = (Kind, f64)> + '_ {
+    let (least, most) = (places[0], places[places.len() - 1]);
+    let positive = least >= 0.0;
+    let lengths =
+        (0..SHAPES).map(move |step| (most - least) * 0.02 * 250.0_f64.powf(step as f64 / SHAPES as f64));
+    let exponents = (1..=SHAPES).map(|step| 0.1 * step as f64);
+    let exponential: Kind = |scale, length| Law::Exponential { scale, length };
+    let saturating: Kind = |scale, length| Law::Saturating { scale, length };
+    let logarithm: Kind = |scale, length| Law::Logarithm { scale, length };
+    let power: Kind = |scale, exponent| Law::Power { scale, exponent };
+    let threshold: Kind = |scale, at| Law::Threshold { scale, at };
+    let linear: Kind = |scale, _| Law::Linear { offset: 0.0, slope: scale };
+    let of_lengths = lengths.filter(move |_| positive);
+    let between = places.windows(2).map(|two| f64::midpoint(two[0], two[1]));
+    std::iter::once((linear, 1.0))
+        .chain(exponents.filter(move |_| positive).map(move |shape| (power, shape)))
+        .chain(
+            of_lengths.flat_map(move |shape| [(exponential, shape), (saturating, shape), (logarithm, shape)]),
+        )
+        .chain(between.map(move |at| (threshold, at)))
+}
+
+/// What a law costs with its best scale, the law, and its columns at the knots. Only a straight line keeps a constant that costs something.
+fn fitted(places: &[f64], curve: &Curve, (kind, shape): &(Kind, f64)) -> Option<(f64, Law, DMatrix<f64>)> {
+    let unit = kind(1.0, *shape);
+    let column = DVector::from_iterator(places.len(), places.iter().map(|at| unit.value(&[*at])));
+    let constant = DVector::from_element(places.len(), 1.0);
+    let both = DMatrix::from_columns(&[column.clone(), constant]);
+    let products = both.transpose() * &curve.gram * &both;
+    let most = products[(0, 0)].max(products[(1, 1)]);
+    let held = &products + DMatrix::identity(2, 2) * (RIDGE * most);
+    let wanted = both.transpose() * &curve.gram * &curve.values;
+    let solved = held.try_inverse()? * wanted;
+    let with = curve.cost(&(&both * &solved));
+    let without = curve.cost(&(&column * solved[0]));
+    if let Law::Linear { .. } = unit {
+        let is_dropped = without - with < FREE_COST;
+        let offset = if is_dropped { 0.0 } else { solved[1] };
+        let law = Law::Linear { offset, slope: solved[0] };
+        return Some((
+            if is_dropped { without } else { with },
+            law,
+            DMatrix::from_columns(&[both.column(1), both.column(0)]),
+        ));
+    }
+    // Without the constant its scale is another.
+    let square = products[(0, 0)];
+    let scale = if without - with < FREE_COST {
+        solved[0]
+    } else if square > 0.0 {
+        column.dot(&(&curve.gram * &curve.values)) / square
+    } else {
+        return None;
+    };
+    let cost = curve.cost(&(&column * scale));
+    // The shape is a number too.
+    Some((cost + 2.0, kind(scale, *shape), DMatrix::from_columns(&[column])))
+}
+
+/// A law times a factor.
+pub(super) fn scaled(law: &Law, by: f64) -> Law {
+    match law.clone() {
+        Law::Linear { offset, slope } => Law::Linear { offset: by * offset, slope: by * slope },
+        Law::Power { scale, exponent } => Law::Power { scale: by * scale, exponent },
+        Law::Exponential { scale, length } => Law::Exponential { scale: by * scale, length },
+        Law::Saturating { scale, length } => Law::Saturating { scale: by * scale, length },
+        Law::Threshold { scale, at } => Law::Threshold { scale: by * scale, at },
+        Law::Periodic { offset, sine, cosine, per_unit } => {
+            Law::Periodic { offset: by * offset, sine: by * sine, cosine: by * cosine, per_unit }
+        }
+        Law::Logarithm { scale, length } => Law::Logarithm { scale: by * scale, length },
+        Law::Table { at, values } => {
+            Law::Table { at, values: values.into_iter().map(|value| by * value).collect() }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "curves_tests.rs"]
+mod tests;

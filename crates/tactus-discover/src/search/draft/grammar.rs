@@ -1,0 +1,261 @@
+//! The grammar: which drafts there are.
+//!
+//! An atom is a carrier, when it acts, and one covariate or two. Not every carrier goes with every covariate: what would be the same to all
+//! data, or cannot be, is left out. None of them is modelled after a case of the evidence.
+
+use std::sync::Arc;
+
+use tactus_model::Covariate;
+use tactus_model::effect::{Carrier, When};
+
+use super::sight::{OF_ELEMENTS, Sight};
+use super::{KNOTS, KNOTS_OF_TWO};
+use crate::fit::{Fitted, Problem};
+use crate::search::tones::{Point, clearest};
+
+/// A draft without its curve.
+#[derive(Debug, Clone)]
+pub(super) struct Atom {
+    pub(super) carrier: Carrier,
+    pub(super) when: When,
+    pub(super) covariates: Vec<Covariate>,
+    /// Places of the knots for each covariate; none of a tone.
+    pub(super) knots: Vec<Vec<f64>>,
+    /// Periods per unit of the covariate, of a tone.
+    pub(super) per_unit: Option<f64>,
+    /// True if each element has a weight of its own, that is to be found.
+    pub(super) of_elements: bool,
+    /// The curve that all elements share, once it is known.
+    pub(super) curve: Option<Arc<Vec<f64>>>,
+    /// The weight of each element, once they are known.
+    pub(super) weights: Option<Arc<Vec<f64>>>,
+    /// From how many alternatives the residual picked it.
+    pub(super) among: f64,
+}
+
+/// Carriers with when they act and what on.
+type Group = (Carrier, When, &'static [Covariate]);
+
+const IN_CONTACT: &[Group] = &[
+    (
+        Carrier::OwnSignal,
+        When::InContact,
+        &[
+            Covariate::Time,
+            Covariate::SinceContact,
+            Covariate::SinceTurn,
+            Covariate::Depth,
+            Covariate::DeepestBefore,
+            Covariate::Direction,
+            Covariate::ApproachX,
+            Covariate::ApproachY,
+            Covariate::Speed,
+            Covariate::PlaceX,
+            Covariate::PlaceY,
+            Covariate::InElementX,
+            Covariate::InElementY,
+            Covariate::Temperature,
+            Covariate::SumOfSignals,
+            Covariate::Signal,
+            Covariate::ShareOfLargest,
+            Covariate::Distance,
+            Covariate::Ahead,
+        ],
+    ),
+    (
+        Carrier::Depth,
+        When::InContact,
+        &[
+            Covariate::Time,
+            Covariate::SinceContact,
+            Covariate::SinceTurn,
+            Covariate::DeepestBefore,
+            Covariate::Direction,
+            Covariate::Speed,
+            Covariate::PlaceX,
+            Covariate::PlaceY,
+            Covariate::InElementX,
+            Covariate::InElementY,
+            Covariate::Temperature,
+        ],
+    ),
+    (
+        Carrier::X,
+        When::InContact,
+        &[
+            Covariate::Time,
+            Covariate::Depth,
+            Covariate::PlaceX,
+            Covariate::PlaceY,
+            Covariate::ApproachX,
+            Covariate::Temperature,
+        ],
+    ),
+    (
+        Carrier::Y,
+        When::InContact,
+        &[
+            Covariate::Time,
+            Covariate::Depth,
+            Covariate::PlaceX,
+            Covariate::PlaceY,
+            Covariate::ApproachY,
+            Covariate::Temperature,
+        ],
+    ),
+    (Carrier::Neighbours, When::InContact, &[Covariate::Depth, Covariate::SumOfSignals]),
+    (Carrier::EveryElement, When::InContact, &[Covariate::Depth, Covariate::Distance]),
+];
+
+const ELSEWHERE: &[Group] = &[
+    (Carrier::PressHere, When::OutOfContact, &[Covariate::Height]),
+    (Carrier::PressHere, When::OnTheWayDown, &[Covariate::Height]),
+    (Carrier::PressHere, When::OnTheWayUp, &[Covariate::Height]),
+    (Carrier::PressThere, When::OutOfContact, &[Covariate::SinceRelease]),
+    (
+        Carrier::Counts,
+        When::InContact,
+        &[Covariate::Depth, Covariate::SinceContact, Covariate::SumOfSignals, Covariate::Speed],
+    ),
+    (
+        Carrier::Counts,
+        When::OutOfContact,
+        &[Covariate::SinceRelease, Covariate::SinceTurn, Covariate::TravelSpeed],
+    ),
+    (
+        Carrier::Counts,
+        When::Always,
+        &[
+            Covariate::Time,
+            Covariate::TravelSpeed,
+            Covariate::SumOfSignals,
+            Covariate::Counts,
+            Covariate::Temperature,
+        ],
+    ),
+];
+
+/// Of single elements: each with a weight, and one curve for all.
+const OF_EACH: &[Group] = &[
+    (Carrier::Counts, When::InContact, &[Covariate::Depth, Covariate::SinceContact]),
+    (Carrier::Counts, When::OutOfContact, &[Covariate::SinceRelease]),
+    (Carrier::Counts, When::Always, &[Covariate::TravelSpeed, Covariate::Temperature]),
+    (Carrier::OwnSignal, When::InContact, &[Covariate::Signal, Covariate::Depth]),
+];
+
+/// Tones.
+const PERIODIC: &[Group] = &[
+    (Carrier::Depth, When::InContact, &[Covariate::Time, Covariate::Travel]),
+    (
+        Carrier::OwnSignal,
+        When::InContact,
+        &[Covariate::Time, Covariate::PlaceX, Covariate::PlaceY, Covariate::Travel],
+    ),
+    (Carrier::X, When::InContact, &[Covariate::PlaceX]),
+    (Carrier::Y, When::InContact, &[Covariate::PlaceY]),
+    (Carrier::Counts, When::InContact, &[Covariate::Time]),
+    (Carrier::Counts, When::Always, &[Covariate::Time, Covariate::Counts, Covariate::Travel]),
+];
+
+/// All atoms that these data can show. `rounds` if the converter's steps are seen: then a tone in counts is the rounding.
+pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: bool) -> Vec<Atom> {
+    let each = |groups: &'static [Group]| {
+        groups.iter().flat_map(|(carrier, when, covariates)| {
+            covariates.iter().map(|covariate| (*carrier, *when, *covariate))
+        })
+    };
+    let smooth = |(carrier, when, covariate): (Carrier, When, Covariate), knots: usize, of_elements| {
+        let knots = sight.knots(covariate, when, knots);
+        // A weight for each element may be of something that does not vary.
+        let is_there = knots.len() > 1 || of_elements && !knots.is_empty();
+        is_there.then(|| Atom { of_elements, ..Atom::of(carrier, when, covariate, knots) })
+    };
+    let mut found: Vec<Atom> = Vec::new();
+    found.extend(each(IN_CONTACT).chain(each(ELSEWHERE)).filter_map(|one| smooth(one, KNOTS, false)));
+    found.extend(each(OF_EACH).filter_map(|one| smooth(one, OF_ELEMENTS, true)));
+    let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
+    let weights: Vec<f64> = problem.weights().collect();
+    for (carrier, when, covariate) in each(PERIODIC) {
+        if rounds && covariate == Covariate::Counts {
+            continue;
+        }
+        let points = sight.points(carrier, covariate, when).map(|(reading, value, unit)| Point {
+            value,
+            wanted: weights[reading] * residual[reading] * unit,
+            square: weights[reading] * unit * unit,
+        });
+        if let Some(tone) = clearest(&points) {
+            let atom = Atom::of(carrier, when, covariate, Vec::new());
+            found.push(Atom { per_unit: Some(tone.per_unit), among: tone.among, ..atom });
+        }
+    }
+    found
+}
+
+/// An atom with each other covariate that its carrier may have beside its own.
+pub(super) fn with_seconds<'a>(best: &'a Atom, sight: &'a Sight) -> impl Iterator<Item = Atom> + 'a {
+    let is_plain = best.per_unit.is_none() && !best.of_elements && best.covariates.len() == 1;
+    let groups = IN_CONTACT
+        .iter()
+        .chain(ELSEWHERE)
+        .filter(move |(carrier, when, _)| is_plain && *carrier == best.carrier && *when == best.when);
+    let own = best.covariates[0];
+    let others = groups.flat_map(|(_, _, covariates)| covariates.iter().copied());
+    // Depth goes with everything in contact, though by itself it may be no covariate of a carrier.
+    let depth = (is_plain && best.when == When::InContact).then_some(Covariate::Depth);
+    let mut seconds: Vec<Covariate> = others.chain(depth).filter(|second| *second != own).collect();
+    seconds.sort_unstable();
+    seconds.dedup();
+    seconds.into_iter().filter_map(move |second| {
+        let knots = [own, second].map(|one| sight.knots(one, best.when, KNOTS_OF_TWO));
+        knots.iter().all(|knots| knots.len() > 1).then(|| Atom {
+            covariates: vec![own, second],
+            knots: knots.into(),
+            ..best.clone()
+        })
+    })
+}
+
+impl Atom {
+    pub(super) fn of(carrier: Carrier, when: When, covariate: Covariate, knots: Vec<f64>) -> Self {
+        Self {
+            carrier,
+            when,
+            covariates: vec![covariate],
+            knots: if knots.is_empty() { Vec::new() } else { vec![knots] },
+            per_unit: None,
+            of_elements: false,
+            curve: None,
+            weights: None,
+            among: 1.0,
+        }
+    }
+
+    /// Number of knots of its curve; of a tone a sine and a cosine.
+    pub(super) fn knots_each(&self) -> usize {
+        if self.per_unit.is_some() { 2 } else { self.knots.iter().map(Vec::len).product() }
+    }
+
+    /// Number of its columns.
+    pub(super) fn columns(&self, elements: usize) -> usize {
+        match (self.of_elements, &self.curve) {
+            (true, Some(_)) => elements,
+            (true, None) => elements * self.knots_each(),
+            (false, _) => self.knots_each(),
+        }
+    }
+
+    /// Of a column: its knot, `None` for the whole curve, and its element, `None` for all.
+    pub(super) fn part(&self, number: usize, elements: usize) -> (Option<usize>, Option<usize>) {
+        match (self.of_elements, &self.curve) {
+            (true, Some(_)) => (None, Some(number % elements)),
+            (true, None) => (Some(number % self.knots_each()), Some(number / self.knots_each())),
+            (false, _) => (Some(number), None),
+        }
+    }
+
+    /// True if another acts on the same by the same.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        self.carrier == other.carrier && self.covariates[0] == other.covariates[0]
+    }
+}

@@ -1,0 +1,305 @@
+//! What a draft would see and act on: the covariates of each bin, and what one unit of each carrier does.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use tactus_model::effect::{Carrier, Draft, Law, When};
+use tactus_model::{Covariate, Seen, Trace};
+
+use super::grammar::Atom;
+use crate::data::DiscoverError;
+use crate::fit::{Direction, Fitted, Free, Grams, Problem, Term, hat};
+
+/// Readings below this share of the largest signal of their bin do not place knots.
+const LOUD_SHARE: f64 = 0.02;
+/// Two knots are apart by this share of the range at least.
+const APART_SHARE: f64 = 0.01;
+/// Knots of the curve from which weights of elements are found.
+const KNOTS_OF_ELEMENTS: usize = 3;
+
+/// The data as a draft sees them, bin by bin.
+pub(super) struct Sight {
+    pub(super) elements: usize,
+    /// The history at each bin, as a pipeline has it.
+    traces: Vec<Trace>,
+    /// The signal of each reading, in mm.
+    signal_mm: Vec<f64>,
+    counts: Vec<f64>,
+    array: tactus_model::Array,
+    /// Change of each reading by a unit of a carrier.
+    units: Vec<(Carrier, Vec<f32>)>,
+}
+
+impl Sight {
+    pub(super) fn of(problem: &Problem<'_>, at: &Fitted) -> Result<Self, DiscoverError> {
+        let predictor = &problem.predictor;
+        let (bins, known, frames) = (predictor.bins, predictor.known, predictor.frames);
+        let elements = bins.elements;
+        let mut traces = Vec::with_capacity(bins.len());
+        let mut trace = Trace::default();
+        let mut before = None;
+        for bin in 0..bins.len() {
+            // A pipeline is that of a run and a tool.
+            let key = (bins.run[bin], frames.indenter[bins.first[bin]]);
+            if before.replace(key).is_some_and(|before| before != key) {
+                trace = Trace::default();
+            }
+            let [x_mm, y_mm, z_mm] = tactus_model::Path::at(&bins.paths[bins.run[bin]], bins.t_s[bin]);
+            let temperature_c = f64::from(frames.temperature_c[bins.first[bin]]);
+            let temperature_c = Some(temperature_c).filter(|c| c.is_finite());
+            trace.take(bins.t_s[bin], known.registration.to_sensor([x_mm, y_mm]), -z_mm, temperature_c);
+            traces.push(trace.clone());
+        }
+        let mut signal_mm = Vec::with_capacity(at.predicted.len());
+        for (bin, counts) in at.predicted.chunks_exact(elements).enumerate() {
+            let run = bins.run[bin];
+            for (element, counts) in counts.iter().enumerate() {
+                let gain = at.parameters.sensitivity[element] * at.parameters.run_gain[run];
+                let linear = (counts - at.parameters.baseline[run][element]) / gain;
+                signal_mm.push(straightened(linear, known.response.quadratic_per_mm[element]));
+            }
+        }
+        let mut sight = Self {
+            elements,
+            traces,
+            signal_mm,
+            counts: at.predicted.clone(),
+            array: known.array.clone(),
+            units: Vec::new(),
+        };
+        for carrier in Carrier::ALL {
+            sight.units.push((carrier, sight.unit(problem, at, carrier)?));
+        }
+        Ok(sight)
+    }
+
+    /// The change of each reading by a unit of a carrier.
+    fn unit(&self, problem: &Problem<'_>, at: &Fitted, carrier: Carrier) -> Result<Vec<f32>, DiscoverError> {
+        #[expect(clippy::cast_possible_truncation, reason = "as precise as a direction needs to be")]
+        let single = |value: f64| value as f32;
+        if carrier == Carrier::Counts {
+            return Ok(vec![1.0; at.predicted.len()]);
+        }
+        let constant = Draft {
+            name: "constant".into(),
+            sentence: "a constant".into(),
+            carrier,
+            when: When::Always,
+            covariates: vec![Covariate::Time],
+            ranges: vec![[0.0, 0.0]],
+            law: Law::Linear { offset: 1.0, slope: 0.0 },
+            weights: None,
+        };
+        let with = at.parameters.with(Term::neutral(constant.define()?));
+        let free = Free::Of { term: with.terms.len() - 1, parameter: 0 };
+        Ok(problem.slope(&with, &at.predicted, free)?.into_iter().map(single).collect())
+    }
+
+    /// Places of knots: quantiles of the covariate's values.
+    pub(super) fn knots(&self, covariate: Covariate, when: When, count: usize) -> Vec<f64> {
+        let mut values = self.values(covariate, when);
+        values.sort_by(f64::total_cmp);
+        let (Some(least), Some(most)) = (values.first().copied(), values.last().copied()) else {
+            return Vec::new();
+        };
+        // The reported position of a stage at rest still varies slightly.
+        let apart = (APART_SHARE * (most - least)).max(1e-3 * most.abs().max(least.abs()));
+        let mut knots: Vec<f64> = Vec::new();
+        for knot in 0..count {
+            let value = values[knot * (values.len() - 1) / (count - 1)];
+            if knots.last().is_none_or(|last| value - last > apart) {
+                knots.push(value);
+            }
+        }
+        knots
+    }
+
+    /// The least and the greatest value of a covariate.
+    pub(super) fn range(&self, covariate: Covariate, when: When) -> [f64; 2] {
+        let values = self.values(covariate, when);
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if least <= most { [least, most] } else { [0.0, 0.0] }
+    }
+
+    /// The values of a covariate at the bins at which a draft acts; of one that differs from element to element those of readings with a
+    /// signal.
+    fn values(&self, covariate: Covariate, when: When) -> Vec<f64> {
+        let bins = (0..self.traces.len()).filter(|bin| when.is_now(&self.traces[*bin]));
+        if !covariate.is_of_element() {
+            return bins
+                .filter_map(|bin| covariate.value(self.seen(bin), 0))
+                .filter(|v| v.is_finite())
+                .collect();
+        }
+        let of_bin = |bin: usize| {
+            let signal_mm = &self.signal_mm[bin * self.elements..(bin + 1) * self.elements];
+            let largest = signal_mm.iter().copied().fold(0.0, f64::max);
+            let is_loud = move |element: &usize| {
+                covariate == Covariate::Counts || signal_mm[*element] > LOUD_SHARE * largest
+            };
+            let value = move |element| covariate.value(self.seen(bin), element);
+            (0..self.elements).filter(is_loud).filter_map(value)
+        };
+        bins.flat_map(of_bin).filter(|value| value.is_finite()).collect()
+    }
+
+    fn seen(&self, bin: usize) -> Seen<'_> {
+        let readings = bin * self.elements..(bin + 1) * self.elements;
+        Seen {
+            trace: &self.traces[bin],
+            array: &self.array,
+            signal_mm: &self.signal_mm[readings.clone()],
+            counts: &self.counts[readings],
+        }
+    }
+
+    /// What one unit of a carrier does to a reading.
+    fn unit_of(&self, carrier: Carrier) -> &[f32] {
+        self.units.iter().find(|(known, _)| *known == carrier).map_or(&[], |(_, unit)| unit)
+    }
+
+    /// A reading's value and the square of what a tone would multiply, for the spectrum of a covariate.
+    pub(super) fn points<'a>(
+        &'a self,
+        carrier: Carrier,
+        covariate: Covariate,
+        when: When,
+    ) -> impl Iterator<Item = (usize, f64, f64)> + Clone + 'a {
+        let unit = self.unit_of(carrier);
+        let bins = (0..self.traces.len()).filter(move |bin| when.is_now(&self.traces[*bin]));
+        bins.flat_map(move |bin| {
+            let of = move |element: usize| {
+                let reading = bin * self.elements + element;
+                let value = covariate.value(self.seen(bin), element)?;
+                Some((reading, value, f64::from(unit[reading])))
+            };
+            (0..self.elements).filter_map(of)
+        })
+    }
+
+    /// The columns of an atom: what it does for a unit at each knot, at each pair of knots, or for each element.
+    pub(super) fn columns<'a>(self: &Arc<Self>, atom: &Atom) -> Vec<Direction<'a>> {
+        let count = atom.columns(self.elements);
+        let column = |number: usize| -> Direction<'a> {
+            let (sight, atom) = (Arc::clone(self), atom.clone());
+            Direction::Column(Box::new(move |bins: Range<usize>| sight.column(&atom, number, bins)))
+        };
+        (0..count).map(column).collect()
+    }
+
+    fn column(&self, atom: &Atom, number: usize, bins: Range<usize>) -> Vec<f64> {
+        let unit = self.unit_of(atom.carrier);
+        let mut column = vec![0.0; bins.len() * self.elements];
+        let first = bins.start * self.elements;
+        let (curve, only) = atom.part(number, self.elements);
+        let elements = only.map_or(0..self.elements, |element| element..element + 1);
+        let is_common = !atom.covariates.iter().any(|covariate| covariate.is_of_element());
+        for bin in bins {
+            if !atom.when.is_now(&self.traces[bin]) {
+                continue;
+            }
+            let seen = self.seen(bin);
+            let common = if is_common { atom.factor(curve, seen, 0) } else { 0.0 };
+            if is_common && common == 0.0 {
+                continue;
+            }
+            for element in elements.clone() {
+                let factor = if is_common { common } else { atom.factor(curve, seen, element) };
+                let weight = atom.weights.as_ref().map_or(1.0, |weights| weights[element]);
+                let reading = bin * self.elements + element;
+                column[reading - first] = factor * weight * f64::from(unit[reading]);
+            }
+        }
+        column
+    }
+
+    /// An atom of single elements with one curve for all of them: that which its knots share most, from the products of each.
+    pub(super) fn with_curve(&self, atom: Atom, grams: &Grams, own: Range<usize>) -> Atom {
+        let knots = atom.knots_each();
+        if knots <= 1 {
+            return Atom { curve: Some(Arc::new(vec![1.0])), ..atom };
+        }
+        // Coefficients element by element, and their precisions; then the greatest pair of singular vectors, by repeated products.
+        let number = |element: usize, knot: usize| own.start + element * knots + knot;
+        let cell = |element: usize, knot: usize| {
+            let size = grams.size(number(element, knot));
+            if size > 0.0 {
+                [grams.wanted(number(element, knot)) / (size * size), size * size]
+            } else {
+                [0.0; 2]
+            }
+        };
+        let mut curve = vec![1.0; knots];
+        for _ in 0..20 {
+            let along = |element: usize| {
+                let (mut wanted, mut square) = (0.0, 0.0);
+                for (knot, at) in curve.iter().enumerate() {
+                    let [coefficient, precision] = cell(element, knot);
+                    wanted += precision * coefficient * at;
+                    square += precision * at * at;
+                }
+                if square > 0.0 { wanted / square } else { 0.0 }
+            };
+            let weights: Vec<f64> = (0..self.elements).map(along).collect();
+            let of_knot = |knot: usize| {
+                let (mut wanted, mut square) = (0.0, 0.0);
+                for (element, weight) in weights.iter().enumerate() {
+                    let [coefficient, precision] = cell(element, knot);
+                    wanted += precision * coefficient * weight;
+                    square += precision * weight * weight;
+                }
+                if square > 0.0 { wanted / square } else { 0.0 }
+            };
+            curve = (0..knots).map(of_knot).collect();
+            let most = curve.iter().fold(0.0_f64, |most, one| most.max(one.abs()));
+            if most == 0.0 {
+                curve = vec![1.0; knots];
+                break;
+            }
+            curve.iter_mut().for_each(|one| *one /= most);
+        }
+        Atom { curve: Some(Arc::new(curve)), ..atom }
+    }
+}
+
+/// The signal whose response is `linear`, with the base model's quadratic term.
+fn straightened(linear: f64, quadratic_per_mm: f64) -> f64 {
+    let root = 1.0 + 4.0 * quadratic_per_mm * linear;
+    if quadratic_per_mm == 0.0 || root <= 0.0 {
+        return linear;
+    }
+    (root.sqrt() - 1.0) / (2.0 * quadratic_per_mm)
+}
+
+impl Atom {
+    /// The product of the hats of a pair of knots, or of all with a curve.
+    pub(super) fn factor(&self, curve: Option<usize>, seen: Seen<'_>, element: usize) -> f64 {
+        let mut values = [0.0; 2];
+        for (value, covariate) in values.iter_mut().zip(&self.covariates) {
+            match covariate.value(seen, element).filter(|value| value.is_finite()) {
+                Some(known) => *value = known,
+                None => return 0.0,
+            }
+        }
+        if let Some(per_unit) = self.per_unit {
+            let (sin, cos) = (std::f64::consts::TAU * per_unit * values[0]).sin_cos();
+            return if curve == Some(0) { sin } else { cos };
+        }
+        let at = |knot: usize| match self.knots.as_slice() {
+            [only] => hat(only, knot, values[0]),
+            [first, second] => {
+                hat(first, knot / second.len(), values[0]) * hat(second, knot % second.len(), values[1])
+            }
+            _ => 1.0,
+        };
+        match (curve, &self.curve) {
+            (Some(knot), _) => at(knot),
+            (None, Some(curve)) => curve.iter().enumerate().map(|(knot, value)| value * at(knot)).sum(),
+            (None, None) => 1.0,
+        }
+    }
+}
+
+/// Knots for the curve of weights.
+pub(super) const OF_ELEMENTS: usize = KNOTS_OF_ELEMENTS;

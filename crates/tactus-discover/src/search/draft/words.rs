@@ -1,0 +1,114 @@
+//! A draft in words: one plain sentence.
+
+use tactus_model::Covariate;
+use tactus_model::effect::{Carrier, Draft, Law, When};
+
+use super::grammar::Atom;
+use super::sight::Sight;
+
+/// The draft of an atom with this law.
+pub(super) fn named(sight: &Sight, atom: &Atom, law: Law, number: usize) -> Draft {
+    let ranges: Vec<[f64; 2]> =
+        atom.covariates.iter().map(|covariate| sight.range(*covariate, atom.when)).collect();
+    let mut draft = Draft {
+        name: format!("draft-{number}"),
+        sentence: String::new(),
+        carrier: atom.carrier,
+        when: atom.when,
+        covariates: atom.covariates.clone(),
+        ranges,
+        law,
+        weights: atom.weights.as_ref().map(|weights| weights.to_vec()),
+    };
+    draft.sentence = sentence(&draft);
+    draft
+}
+
+/// What a draft is, in one sentence.
+pub(super) fn sentence(draft: &Draft) -> String {
+    let when = match draft.when {
+        When::Always => "at all times",
+        When::InContact => "while the tool touches",
+        When::OutOfContact => "while the tool does not touch",
+        When::OnTheWayDown => "above the surface on the way down",
+        When::OnTheWayUp => "above the surface on the way up",
+    };
+    let what = match draft.carrier {
+        Carrier::Depth => "the tip stands deeper by an amount",
+        Carrier::X => "the tip stands further along x by an amount",
+        Carrier::Y => "the tip stands further along y by an amount",
+        Carrier::OwnSignal => "the signal changes by a share",
+        Carrier::Neighbours => "a share of the neighbours' mean signal is added, a share",
+        Carrier::EveryElement => "the same signal is added to every element, an amount",
+        Carrier::PressHere => "the elements feel a press under the tip of a depth",
+        Carrier::PressThere => "the elements feel a press at the last pressed place of a depth",
+        Carrier::Counts => "counts are added, a number",
+    };
+    let names: Vec<&str> = draft.covariates.iter().map(|covariate| covariate.name()).collect();
+    let own = if draft.weights.is_some() { ", with a weight for each element," } else { "" };
+    let how = match &draft.law {
+        Law::Linear { .. } => "in a straight line".to_owned(),
+        Law::Power { exponent, .. } => format!("as its power {exponent:.2}"),
+        Law::Exponential { length, .. } => {
+            format!("falling off with a length of {length:.3} {}", unit(draft))
+        }
+        Law::Saturating { length, .. } => {
+            format!("levelling off with a length of {length:.3} {}", unit(draft))
+        }
+        Law::Threshold { at, .. } => format!("at once from {at:.3} {} on", unit(draft)),
+        Law::Periodic { per_unit, .. } => {
+            format!("as a tone with a period of {:.4} {}", 1.0 / per_unit, unit(draft))
+        }
+        Law::Logarithm { length, .. } => {
+            format!("as a logarithm with a length of {length:.3} {}", unit(draft))
+        }
+        Law::Table { .. } => "along a free curve".to_owned(),
+    };
+    let [least, most] = extent(draft);
+    let (scale, of) =
+        if draft.carrier.unit() == "share" { (100.0, "%") } else { (1.0, draft.carrier.unit()) };
+    format!(
+        "{}, {what}{own} that follows the {}, {how}: {} to {} {of}",
+        capital(when),
+        names.join(" and the "),
+        number(scale * least),
+        number(scale * most),
+    )
+}
+
+fn unit(draft: &Draft) -> &'static str {
+    draft.covariates.first().copied().map_or("", Covariate::unit)
+}
+
+/// The least and the greatest value of a draft within the range of its data.
+fn extent(draft: &Draft) -> [f64; 2] {
+    let values: Vec<f64> = match &draft.law {
+        Law::Table { values, .. } => values.clone(),
+        law => {
+            let [from, to] = draft.ranges[0];
+            (0..=100).map(|step| law.value(&[from + (to - from) * f64::from(step) / 100.0])).collect()
+        }
+    };
+    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    [least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+}
+
+/// With three digits.
+fn number(value: f64) -> String {
+    let digits = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    let places = (2.0 - digits).clamp(0.0, 6.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 6")]
+    let places = places as usize;
+    format!("{value:.places$}")
+}
+
+fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    letters
+        .next()
+        .map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
+
+#[cfg(test)]
+#[path = "words_tests.rs"]
+mod tests;

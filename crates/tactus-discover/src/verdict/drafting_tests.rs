@@ -1,0 +1,93 @@
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use tactus_model::Covariate;
+use tactus_model::effect::{Carrier, PipelineStage, When};
+
+use crate::fixtures::{ELEMENTS, found, known, measured, processes};
+use crate::{Discovery, DraftedEffect, Frames, Known, NoDraft, Verdict};
+
+/// Independent noise of one count, nearly white.
+fn noise() -> Vec<Vec<f64>> {
+    processes(ELEMENTS, 1.0, 0.03, &mut ChaCha8Rng::seed_from_u64(11))
+}
+
+/// Frames in which `more` is added to the counts of the base model, from the rises of all elements, the depth and the element.
+fn with(more: impl Fn(&[f64], f64, usize) -> f64) -> (Known, Frames) {
+    let known = known();
+    let clean = measured(&known, &[], &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
+    let mut upon = noise();
+    for (frame, upon) in upon.iter_mut().enumerate() {
+        let rises: Vec<f64> = clean.counts_of(frame).iter().map(|counts| f64::from(*counts) - 100.0).collect();
+        let depth_mm = -clean.position_mm[frame][2];
+        upon.iter_mut().enumerate().for_each(|(element, upon)| *upon += more(&rises, depth_mm, element));
+    }
+    let frames = measured(&known, &[], &upon);
+    (known, frames)
+}
+
+fn drafted(found: &Discovery) -> &DraftedEffect {
+    match &found.draft {
+        Some(Ok(draft)) => draft,
+        other => panic!("{:?} {:?}: {other:?}", found.verdict, found.steps.iter().map(|step| step.effect).collect::<Vec<_>>()),
+    }
+}
+
+/// A supply that sags with the square of the sum of all signals, which no effect of the library does.
+fn droop(sum_counts: f64) -> f64 {
+    -0.15 * (sum_counts / 6000.0).powi(2)
+}
+
+#[test]
+fn a_supply_that_sags_is_drafted_as_a_share_of_the_signal_by_the_sum() {
+    let (known, frames) = with(|rises, _, element| rises[element] * droop(rises.iter().sum()));
+    let found = found(&known, &frames);
+    let drafted = drafted(&found);
+    let draft = &drafted.draft;
+    assert_eq!((draft.carrier, draft.stage()), (Carrier::OwnSignal, PipelineStage::Element), "{draft:?}");
+    assert_eq!(draft.covariates, [Covariate::SumOfSignals], "{draft:?}");
+    assert!(!drafted.is_partial(), "{:?}", drafted.closed_share);
+    assert!(drafted.p_value <= 0.005 && drafted.folds >= 4, "{drafted:?}");
+    // The curve, in mm of 1000 counts; a constant share is the gain's.
+    let [least, most] = draft.ranges[0];
+    let of_truth = |at: f64| droop(1000.0 * at);
+    let (from, to) = (least + 0.1 * (most - least), most);
+    let rise = draft.law.value(&[to]) - draft.law.value(&[from]);
+    let want = of_truth(to) - of_truth(from);
+    assert!((rise / want - 1.0).abs() < 0.15, "{rise} {want}");
+}
+
+#[test]
+fn counts_that_come_with_contact_are_drafted_with_a_weight_for_each_element() {
+    let weight = |element: usize| 0.5 + (element % 7) as f64 / 6.0;
+    let (known, frames) = with(|_, depth_mm, element| if depth_mm > 0.0 { 6.0 * weight(element) } else { 0.0 });
+    let found = found(&known, &frames);
+    let drafted = drafted(&found);
+    let draft = &drafted.draft;
+    assert_eq!((draft.carrier, draft.when), (Carrier::Counts, When::InContact), "{draft:?}");
+    assert!(!drafted.is_partial(), "{:?}", drafted.closed_share);
+    let at = draft.ranges[0].iter().sum::<f64>() / 2.0;
+    let weights = draft.weights.as_ref().expect("weights");
+    for (element, own) in weights.iter().enumerate() {
+        let (got, want) = (own * draft.law.value(&[at]), 6.0 * weight(element));
+        assert!((got - want).abs() < 1.5, "{element}: {got} {want}");
+    }
+}
+
+#[test]
+fn nothing_is_drafted_where_nothing_is_missing() {
+    let (known, frames) = with(|_, _, _| 0.0);
+    let found = found(&known, &frames);
+    assert_eq!((found.verdict, &found.draft), (Verdict::NothingMissing, &None));
+}
+
+#[test]
+fn a_draft_in_the_library_is_found_by_its_name_and_leaves_nothing_to_draft() {
+    let (known, frames) = with(|rises, _, element| rises[element] * droop(rises.iter().sum()));
+    let first = found(&known, &frames);
+    let definition = drafted(&first).draft.clone().define().unwrap();
+    let with_draft = Known { drafts: vec![definition], ..known };
+    let second = found(&with_draft, &frames);
+    let names: Vec<&str> = second.steps.iter().map(|step| step.effect).collect();
+    assert_eq!(names, ["draft-1"]);
+    assert!(second.draft.is_none() || second.draft == Some(Err(NoDraft::Noise)), "{:?}", second.draft);
+}

@@ -1,0 +1,106 @@
+//! The draft of what no effect of the library explains.
+
+use std::fmt;
+
+use tactus_discover::{Discovery, DraftedEffect, NoDraft};
+use tactus_model::effect::Law;
+use tactus_schema::draft::{DraftStatus, stage_name};
+
+use super::{
+    figures::drafted_curve,
+    words::{self, percent},
+};
+use crate::{
+    document::{Column, Table},
+    markup::Text,
+    numbers::digits,
+};
+
+/// What becomes of a draft before a new measurement.
+pub fn status(found: &DraftedEffect) -> DraftStatus {
+    if found.is_partial() { DraftStatus::Partial } else { DraftStatus::Drafted }
+}
+
+pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
+    match &found.draft {
+        None => Ok(()),
+        Some(Err(none)) => no_draft(f, none),
+        Some(Ok(draft)) => drafted(f, found, draft),
+    }
+}
+
+fn no_draft(f: &mut fmt::Formatter<'_>, none: &NoDraft) -> fmt::Result {
+    writeln!(f, "<section>\n<h2>Draft of an effect</h2>\n<p>None: {}.</p>\n</section>", Text(none.in_words()))
+}
+
+fn drafted(f: &mut fmt::Formatter<'_>, found: &Discovery, one: &DraftedEffect) -> fmt::Result {
+    let draft = &one.draft;
+    writeln!(
+        f,
+        "<section>\n<div class=\"headline\"><h2>Draft of an effect</h2><span class=\"badge warn\">{}</span></div>\n<p class=\"verdict\">{}.</p>\n\
+         <p>No effect of the library explains what is left; this was drafted from the fitted presses. It is <code>{}</code> in \
+         <code>model.toml</code> and a file of its own beside it. A new measurement confirms or refutes it; a person gives it a name.</p>",
+        status(one).name(),
+        Text(&draft.sentence),
+        Text(&draft.name),
+    )?;
+    if !one.knots.is_empty() {
+        writeln!(
+            f,
+            "<figure>\n{}\n<figcaption>The draft\u{2019}s curve: fitted knots with standard errors{}.</figcaption>\n</figure>",
+            drafted_curve(one),
+            if matches!(draft.law, Law::Table { .. }) {
+                ""
+            } else {
+                ", and the law that passes through them"
+            }
+        )?;
+    }
+    let mut table = Table::new(&[Column::Name("what"), Column::Name("value")]);
+    let covariates: Vec<String> = draft
+        .covariates
+        .iter()
+        .zip(&draft.ranges)
+        .map(|(covariate, [least, most])| {
+            format!(
+                "{}, {} to {} {}",
+                covariate.name(),
+                digits(*least, 3),
+                digits(*most, 3),
+                covariate.unit()
+            )
+        })
+        .collect();
+    let numbers: Vec<String> =
+        draft.law.numbers().into_iter().map(|(name, value)| format!("{name} {}", digits(value, 3))).collect();
+    let law = if numbers.is_empty() {
+        draft.law.name().to_owned()
+    } else {
+        format!("{}: {}", draft.law.name(), numbers.join(", "))
+    };
+    let nearest: Vec<String> =
+        one.nearest.iter().map(|(name, behind)| format!("{name} ({} behind)", digits(*behind, 3))).collect();
+    let noise = found.floor.rms_counts();
+    let level = |counts: f64| {
+        let in_noise = noise
+            .map_or_else(String::new, |noise| format!(", {} times the noise", digits(counts / noise, 3)));
+        format!("{} counts rms{in_noise}", digits(counts, 3))
+    };
+    for (what, value) in [
+        ("stage", stage_name(draft.stage()).to_owned()),
+        ("carrier", format!("{} ({})", draft.carrier.name(), draft.carrier.unit())),
+        ("acts", draft.when.name().to_owned()),
+        ("depends on", covariates.join("; ")),
+        ("law", law),
+        ("probability by noise alone", words::probability(one.p_value)),
+        ("logarithm of its odds", digits(one.ln_odds, 3)),
+        ("nearest classes, by the same", nearest.join(", ")),
+        ("folds in which it comes first", format!("{} of 5", one.folds)),
+        ("held-out residual without it", level(one.heldout_rms_before_counts)),
+        ("held-out residual with it", level(one.heldout_rms_after_counts)),
+        ("closes of what was left", one.closed_share.map_or_else(|| "unknown".into(), percent)),
+    ] {
+        table.row([what.to_owned(), value]);
+    }
+    writeln!(f, "{table}\n</section>")
+}
