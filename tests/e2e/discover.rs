@@ -12,6 +12,7 @@ use serde_json::Value;
 use tactus_e2e::{CommandOutput, Process, repository, tactus};
 use tactus_record::rows;
 use tactus_record::table::TableWriter;
+use tactus_schema::DraftFile;
 use tactus_schema::table::Row;
 use tempfile::TempDir;
 
@@ -209,6 +210,45 @@ fn dead_elements_are_named_with_calibrates_evidence_and_the_grown_model_closes_t
         faulty[0]["evidence"].as_str().unwrap().contains("where the median element rises by"),
         "{faulty:?}"
     );
+}
+
+#[test]
+fn what_has_no_name_is_drafted_and_the_draft_holds_on_a_new_run_and_on_another_rig() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    hide(folder, "supply-droop", 2.0);
+    let first = diagnosed(folder, &["--truth", "hidden.toml"], "1");
+    let said = tactus(folder, &["--json", "discover", &first]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let found = said.json();
+    let draft = &found["draft"];
+    let is = [&draft["stage"], &draft["carrier"], &draft["covariates"][0]["covariate"]];
+    assert_eq!(is, ["element", "own signal", "sum of signals"], "{} {draft}", found["steps"]);
+    let file = fs::read_to_string(folder.join("discovery/draft-1.toml")).unwrap();
+    let read = DraftFile::from_toml(&file).unwrap();
+    assert_eq!(read.to_toml().unwrap(), file, "reading and writing it changes nothing");
+    let sha256 = read.evidence.unwrap().data.into_values().next();
+    assert_eq!(sha256.as_deref(), found["data"][0]["sha256"].as_str());
+
+    let new = diagnosed(folder, &["--truth", "hidden.toml"], "2");
+    let without = gap_counts(&new, &diagnosed(folder, &[], "2"));
+    let grown = gap_counts(&new, &diagnosed(folder, &["--truth", "discovery/model.toml"], "2"));
+    assert!(without.powi(2) > 5.0 * grown.powi(2), "{without} counts without, {grown} with the draft");
+
+    // A rig that has the draft in its model, and a discovery that has it in its library.
+    fs::create_dir(folder.join("drafts")).unwrap();
+    fs::copy(folder.join("discovery/draft-1.toml"), folder.join("drafts/draft-1.toml")).unwrap();
+    let other = diagnosed(folder, &["--truth", "discovery/model.toml"], "3");
+    let said = tactus(folder, &["--json", "discover", &other, "--library", "drafts", "--out", "other"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let named: Vec<Value> =
+        said.json()["steps"].as_array().unwrap().iter().map(|step| step["effect"].clone()).collect();
+    assert_eq!(named, ["draft-1"], "{}", said.json()["draft"]);
+
+    fs::write(folder.join("drafts/model.toml"), file.replace("tactus.draft/1", "tactus.model/1")).unwrap();
+    let said = tactus(folder, &["discover", &other, "--library", "drafts", "--out", "refused"]);
+    assert_eq!(said.code, Some(2), "{said:?}");
+    assert!(said.err.contains("drafts/model.toml: schema: this program reads"), "{said:?}");
 }
 
 /// Names of what is in a folder, in order.

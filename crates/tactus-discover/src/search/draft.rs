@@ -21,7 +21,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use tactus_model::effect::Draft;
+use tactus_model::effect::{Carrier, Draft};
 
 use self::grammar::Atom;
 use self::sight::Sight;
@@ -44,7 +44,7 @@ const FOLDS: usize = 5;
 /// Logarithm of the odds by which a draft must be ahead of every class.
 const AHEAD_LN_ODDS: f64 = 5.0;
 /// Least part of a draft that recalibration and the model do not take up.
-const OWN_LEAST: f64 = 0.3;
+const OWN_LEAST: f64 = 0.1;
 /// In so many folds the same atom must come first.
 const FOLDS_LEAST: usize = 4;
 /// Changes the seed, so that drafts have other sign flips than classes and covariates.
@@ -67,6 +67,8 @@ pub(crate) struct Drafted {
     pub(crate) folds: usize,
     /// The classes that come nearest, with by how much each is behind.
     pub(crate) nearest: Vec<(&'static str, f64)>,
+    /// Other drafts that these data cannot tell from it, in words.
+    pub(crate) alike: Vec<String>,
 }
 
 /// Why there is no draft.
@@ -121,7 +123,13 @@ impl Search<'_> {
         let additions = additions(&weighed, &grams, count);
         let evidence = self.evidence_of(&additions, grams.reduced());
         let ranked = ranked(&evidence);
-        let Some((best, ln_odds)) = ranked.first().copied() else { return Ok(Err(NoDraft::NoGain)) };
+        let as_good = as_good_as_first(&ranked);
+        // Of those that are as good the one with the fewest numbers.
+        let simplest = as_good.iter().min_by_key(|(one, _)| weighed[*one].directions.len());
+        let Some((best, ln_odds)) = simplest.copied() else { return Ok(Err(NoDraft::NoGain)) };
+        let alike = as_good.iter().filter(|(one, _)| !weighed[*one].atom.is_like(&weighed[best].atom));
+        let mut alike: Vec<String> = alike.map(|(one, _)| words::of_atom(&weighed[*one].atom)).collect();
+        alike.dedup();
         let folds = self.folds(&additions, &weighed, &grams, best);
         if folds < FOLDS_LEAST {
             return Ok(Err(NoDraft::Unsteady));
@@ -141,7 +149,7 @@ impl Search<'_> {
         if drafted.ln_odds < AHEAD_LN_ODDS {
             return Ok(Err(NoDraft::NoGain));
         }
-        (drafted.p_value, drafted.folds, drafted.nearest) = (p_value, folds, nearest);
+        (drafted.p_value, drafted.folds, drafted.nearest, drafted.alike) = (p_value, folds, nearest, alike);
         Ok(Ok(Box::new(drafted)))
     }
 
@@ -206,7 +214,8 @@ impl Search<'_> {
         Evidence { additions, products, variance: self.problem.variance, present: &[] }
     }
 
-    /// In how many folds of blocks the best atom comes first: of those not in the fold, whose products with the residual are summed.
+    /// In how many folds of blocks the best atom comes first or is as good as the first: of the blocks not in the fold, whose products with the
+    /// residual are summed.
     fn folds(&self, additions: &[Addition], weighed: &[Weighed], grams: &Grams, best: usize) -> usize {
         let blocks = grams.along(0).len();
         let first_in = |fold: &usize| {
@@ -221,9 +230,8 @@ impl Search<'_> {
                 products[(direction, last)] = wanted;
                 products[(last, direction)] = wanted;
             }
-            ranked(&self.evidence_of(additions, &products))
-                .first()
-                .is_some_and(|(first, _)| weighed[*first].atom.is_like(&weighed[best].atom))
+            let ranked = ranked(&self.evidence_of(additions, &products));
+            as_good_as_first(&ranked).iter().any(|(one, _)| weighed[*one].atom.is_like(&weighed[best].atom))
         };
         (0..FOLDS).filter(first_in).count()
     }
@@ -269,6 +277,7 @@ impl Search<'_> {
         number: usize,
     ) -> Result<Option<Drafted>, DiscoverError> {
         let atom = if atom.of_elements { self.with_weights(at, sight, atom)? } else { atom };
+        let atom = self.with_weights_beside(at, sight, atom)?;
         let curve = self.curve(at, sight, &atom)?;
         let reduced = curves::reduced(&atom, &curve, excused(0.5 * curve.squares()));
         let draft = words::named(sight, &atom, reduced.law, number);
@@ -281,6 +290,7 @@ impl Search<'_> {
             ln_odds: 0.0,
             folds: 0,
             nearest: Vec::new(),
+            alike: Vec::new(),
         }))
     }
 
@@ -305,6 +315,42 @@ impl Search<'_> {
         let most = weights.iter().fold(f64::MIN_POSITIVE, |most: f64, one| most.max(one.abs()));
         let weights = Arc::new(weights.iter().map(|one| one / most).collect());
         Ok(Atom { weights: Some(weights), of_elements: false, curve: None, ..atom })
+    }
+
+    /// An atom that acts on all elements alike, with a weight for each if what differs between them gains more than a form is excused for.
+    fn with_weights_beside(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atom: Atom,
+    ) -> Result<Atom, DiscoverError> {
+        let may_have = matches!(atom.carrier, Carrier::Counts | Carrier::OwnSignal | Carrier::EveryElement);
+        if atom.weights.is_some() || atom.per_unit.is_some() || atom.covariates.len() > 1 || !may_have {
+            return Ok(atom);
+        }
+        let curve = self.curve(at, sight, &atom)?.values;
+        let most = curve.amax();
+        if most == 0.0 {
+            return Ok(atom);
+        }
+        let shared = Arc::new(curve.iter().map(|value| value / most).collect());
+        let beside = Atom { of_elements: true, curve: Some(shared), ..atom.clone() };
+        let (weighed, grams) = self.products(at, sight, vec![atom.clone(), beside])?;
+        let additions = additions(&weighed, &grams, 1.0);
+        let evidence = self.evidence_of(&additions, grams.reduced());
+        let common = evidence.set([0]);
+        if evidence.gain(&common, 1).ln_odds <= excused(common.ln_odds) {
+            return Ok(atom);
+        }
+        let found: BTreeMap<usize, f64> = evidence.coefficients(&evidence.set([0, 1])).into_iter().collect();
+        let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
+        let most = weighed[0]
+            .directions
+            .iter()
+            .map(value)
+            .fold(f64::MIN_POSITIVE, |most: f64, one| most.max(one.abs()));
+        let weights = weighed[1].directions.iter().map(|one| 1.0 + value(one) / most).collect();
+        Ok(Atom { weights: Some(Arc::new(weights)), ..atom })
     }
 
     /// The draft as a term of the model, with its law scaled so that its strength is 1; `None` if it does not come nearer to the data.
@@ -351,6 +397,12 @@ fn additions(weighed: &[Weighed], grams: &Grams, count: f64) -> Vec<Addition> {
         is_free: false,
     };
     weighed.iter().enumerate().map(of).collect()
+}
+
+/// Those that are behind the first by less than a draft must be ahead of a class.
+fn as_good_as_first(ranked: &[(usize, f64)]) -> Vec<(usize, f64)> {
+    let first = ranked.first().map_or(0.0, |(_, odds)| *odds);
+    ranked.iter().copied().filter(|(_, odds)| *odds > first - AHEAD_LN_ODDS).collect()
 }
 
 /// The additions with the logarithm of their odds, greatest first.

@@ -29,6 +29,8 @@ pub struct DraftedEffect {
     pub folds: usize,
     /// The classes that come nearest, and by how much the logarithm of the odds of each is behind.
     pub nearest: Vec<(&'static str, f64)>,
+    /// Other drafts that these data cannot tell from it, in words.
+    pub alike: Vec<String>,
     /// Share of what was left that it closes on held-out presses; `None` where nothing was left there.
     pub closed_share: Option<f64>,
     /// Root mean square of the residual on held-out presses without it and with it.
@@ -61,7 +63,7 @@ pub(super) fn drafted(
         Ok(found) => *found,
         Err(none) => return Ok(Err(none)),
     };
-    let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest } = found;
+    let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest, alike } = found;
     let after = prepared.held(&at.parameters)?;
     let [before, after] = [of_grown.rms_counts, after.rms_counts];
     let left = before * before - noise_counts * noise_counts;
@@ -73,6 +75,7 @@ pub(super) fn drafted(
         ln_odds,
         folds,
         nearest,
+        alike,
         closed_share: (left > 0.0).then(|| ((before * before - after * after) / left).min(1.0)),
         heldout_rms_before_counts: before,
         heldout_rms_after_counts: after,

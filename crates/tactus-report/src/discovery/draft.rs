@@ -86,6 +86,7 @@ fn drafted(f: &mut fmt::Formatter<'_>, found: &Discovery, one: &DraftedEffect) -
             .map_or_else(String::new, |noise| format!(", {} times the noise", digits(counts / noise, 3)));
         format!("{} counts rms{in_noise}", digits(counts, 3))
     };
+    let alike = if one.alike.is_empty() { "none".to_owned() } else { one.alike.join("; ") };
     for (what, value) in [
         ("stage", stage_name(draft.stage()).to_owned()),
         ("carrier", format!("{} ({})", draft.carrier.name(), draft.carrier.unit())),
@@ -95,7 +96,8 @@ fn drafted(f: &mut fmt::Formatter<'_>, found: &Discovery, one: &DraftedEffect) -
         ("probability by noise alone", words::probability(one.p_value)),
         ("logarithm of its odds", digits(one.ln_odds, 3)),
         ("nearest classes, by the same", nearest.join(", ")),
-        ("folds in which it comes first", format!("{} of 5", one.folds)),
+        ("drafts that these data cannot tell from it", alike),
+        ("folds in which it comes first or as good", format!("{} of 5", one.folds)),
         ("held-out residual without it", level(one.heldout_rms_before_counts)),
         ("held-out residual with it", level(one.heldout_rms_after_counts)),
         ("closes of what was left", one.closed_share.map_or_else(|| "unknown".into(), percent)),

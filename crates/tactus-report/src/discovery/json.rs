@@ -303,6 +303,7 @@ struct DraftedJson<'a> {
     ln_odds: f64,
     folds: usize,
     nearest: Vec<NearestJson<'a>>,
+    alike: &'a [String],
     closed_share: Option<f64>,
     heldout_rms_before: f64,
     heldout_rms_after: f64,
@@ -467,6 +468,7 @@ impl<'a> DraftedJson<'a> {
                 .iter()
                 .map(|(effect, behind)| NearestJson { effect, ln_odds_behind: *behind })
                 .collect(),
+            alike: &found.alike,
             closed_share: found.closed_share,
             heldout_rms_before: found.heldout_rms_before_counts,
             heldout_rms_after: found.heldout_rms_after_counts,

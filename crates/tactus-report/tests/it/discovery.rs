@@ -7,12 +7,12 @@
 use std::{env, fs, path::Path};
 
 use crate::made_up::discovery::{
-    cannot_judge, data, empty, explained, faulty, nothing_missing, report, unexplained,
+    cannot_judge, data, draft, empty, explained, faulty, nothing_missing, report, unexplained,
 };
 use serde_json::Value;
 use tactus_discover::{
-    Discovery, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, RefutedFormula, Unexplained,
-    Verdict,
+    Discovery, DraftedEffect, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, NoDraft,
+    RefutedFormula, Unexplained, Verdict,
 };
 use tactus_model::Array;
 use tactus_report::discovery::{
@@ -136,6 +136,47 @@ fn an_effect_with_a_table_shows_it() {
     assert_eq!(step["tables"][0].to_string(), table);
 }
 
+#[test]
+fn a_draft_has_its_sentence_its_curve_and_what_speaks_for_it() {
+    let mut discovery = explained();
+    discovery.draft = Some(Ok(Box::new(draft())));
+    let page = html(&discovery);
+    show("draft.html", &page);
+    for part in [
+        "Draft of an effect",
+        "a share &lt;that&gt; follows",
+        "badge warn\">drafted<",
+        "Curve of draft-1",
+        "power: scale \u{2212}0.0125, exponent 2.00",
+        "sum of signals, 0 to 4.00 mm",
+        "saturation (76.2 behind)",
+        "depth in contact, by temperature",
+        "5 of 5",
+        "3.45 counts rms",
+        "93 %",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    let json = json(&discovery);
+    let draft = &json["draft"];
+    assert_eq!(
+        (&draft["status"], &draft["stage"], &draft["law"]),
+        (&"drafted".into(), &"element".into(), &"power".into())
+    );
+    assert_eq!(draft["knots"][1].to_string(), r#"{"at":2.0,"formula":-0.05,"se":0.002,"value":-0.05}"#);
+
+    discovery.draft = Some(Ok(Box::new(DraftedEffect { closed_share: Some(0.4), ..self::draft() })));
+    assert!(html(&discovery).contains("badge warn\">partial<"));
+    discovery.draft = Some(Err(NoDraft::Class("hardening")));
+    assert!(html(&discovery).contains("None: hardening of the library explains nearly as much."));
+    assert_eq!(
+        self::json(&discovery)["draft"]["none_because"],
+        "hardening of the library explains nearly as much"
+    );
+    discovery.draft = None;
+    assert!(!html(&discovery).contains("Draft of an effect"));
+}
+
 /// A discovery with every kind of field filled, compared byte for byte with `golden/discovery.json`.
 ///
 /// With `TACTUS_WRITE_GOLDEN` set, the file is written anew.
@@ -148,6 +189,7 @@ fn the_json_keeps_its_form_to_the_byte() {
     discovery.heldout_frames.clear();
     discovery.faulty = faulty().faulty;
     discovery.tentative = discovery.steps[..1].to_vec();
+    discovery.draft = Some(Ok(Box::new(draft())));
     discovery.global = discovery.global.map(|global| GlobalTest { statistic: f64::NAN, ..global });
     discovery.base.heldout_chi2 = Some(f64::INFINITY);
     let undecided = |equivalent| AmbiguousEffect { effect: "hysteresis", equivalent };

@@ -39,6 +39,12 @@ pub(super) struct Reduced {
     pub(super) knots: Vec<[f64; 3]>,
 }
 
+/// Steps by which a shape is refined, each half of the one before.
+const REFINEMENTS: i32 = 8;
+
+/// A law with what it costs, and its columns at the knots.
+type Priced = (f64, Law, DMatrix<f64>);
+
 /// A law of one covariate, up to its scale.
 type Kind = fn(scale: f64, shape: f64) -> Law;
 
@@ -77,12 +83,17 @@ pub(super) fn reduced(atom: &Atom, curve: &Curve, excused: f64) -> Reduced {
         let law = Law::Table { at: atom.knots.clone(), values: curve.values.iter().copied().collect() };
         return Reduced { law, covariance: all, knots: Vec::new() };
     };
+    if places.len() == 1 {
+        let law = Law::Linear { offset: curve.values[0], slope: 0.0 };
+        return Reduced { law, covariance: all, knots: Vec::new() };
+    }
     let error = |knot: usize| all.get(knot).map_or(f64::NAN, |row| row[knot].sqrt());
     let knots =
         places.iter().zip(curve.values.iter()).enumerate().map(|(knot, (at, v))| [*at, *v, error(knot)]);
     let knots = knots.collect();
-    let best =
-        candidates(places).filter_map(|kind| fitted(places, curve, &kind)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let of = |(kind, shape): (Kind, f64)| Some((fitted(places, curve, kind, shape)?, kind, shape));
+    let best = candidates(places).filter_map(of).min_by(|a, b| a.0.0.total_cmp(&b.0.0));
+    let best = best.map(|(best, kind, shape)| refined(places, curve, kind, shape, best));
     if let Some((_, law, columns)) = best.filter(|(cost, ..)| 0.5 * cost <= excused) {
         return Reduced { covariance: curve.covariance(&columns), law, knots };
     }
@@ -113,9 +124,23 @@ fn candidates(places: &[f64]) -> impl Iterator<Item = (Kind, f64)> + '_ {
         .chain(between.map(move |at| (threshold, at)))
 }
 
+/// The same law with the shape between the tried ones that costs least.
+fn refined(places: &[f64], curve: &Curve, kind: Kind, shape: f64, best: Priced) -> Priced {
+    let (mut best, mut shape) = (best, shape);
+    for halving in 0..REFINEMENTS {
+        let step = 0.1 * 0.5_f64.powi(halving);
+        for next in [shape * (1.0 - step), shape * (1.0 + step)] {
+            if let Some(found) = fitted(places, curve, kind, next).filter(|found| found.0 < best.0) {
+                (best, shape) = (found, next);
+            }
+        }
+    }
+    best
+}
+
 /// What a law costs with its best scale, the law, and its columns at the knots. Only a straight line keeps a constant that costs something.
-fn fitted(places: &[f64], curve: &Curve, (kind, shape): &(Kind, f64)) -> Option<(f64, Law, DMatrix<f64>)> {
-    let unit = kind(1.0, *shape);
+fn fitted(places: &[f64], curve: &Curve, kind: Kind, shape: f64) -> Option<Priced> {
+    let unit = kind(1.0, shape);
     let column = DVector::from_iterator(places.len(), places.iter().map(|at| unit.value(&[*at])));
     let constant = DVector::from_element(places.len(), 1.0);
     let both = DMatrix::from_columns(&[column.clone(), constant]);
@@ -147,7 +172,7 @@ fn fitted(places: &[f64], curve: &Curve, (kind, shape): &(Kind, f64)) -> Option<
     };
     let cost = curve.cost(&(&column * scale));
     // The shape is a number too.
-    Some((cost + 2.0, kind(scale, *shape), DMatrix::from_columns(&[column])))
+    Some((cost + 2.0, kind(scale, shape), DMatrix::from_columns(&[column])))
 }
 
 /// A law times a factor.

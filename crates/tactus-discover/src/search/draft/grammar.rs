@@ -143,6 +143,12 @@ const OF_EACH: &[Group] = &[
     (Carrier::OwnSignal, When::InContact, &[Covariate::Signal, Covariate::Depth]),
 ];
 
+/// Constants: what comes with contact, whatever else there is.
+const CONSTANT: &[Group] = &[
+    (Carrier::Counts, When::InContact, &[Covariate::Depth]),
+    (Carrier::EveryElement, When::InContact, &[Covariate::Depth]),
+];
+
 /// Tones.
 const PERIODIC: &[Group] = &[
     (Carrier::Depth, When::InContact, &[Covariate::Time, Covariate::Travel]),
@@ -173,6 +179,12 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
     let mut found: Vec<Atom> = Vec::new();
     found.extend(each(IN_CONTACT).chain(each(ELSEWHERE)).filter_map(|one| smooth(one, KNOTS, false)));
     found.extend(each(OF_EACH).filter_map(|one| smooth(one, OF_ELEMENTS, true)));
+    found.extend(each(CONSTANT).flat_map(|(carrier, when, covariate)| {
+        let place = sight.knots(covariate, when, 1);
+        let constant = (!place.is_empty()).then(|| Atom::of(carrier, when, covariate, place));
+        let of_elements = constant.clone().map(|atom| Atom { of_elements: true, ..atom });
+        [constant, of_elements].into_iter().flatten()
+    }));
     let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
     let weights: Vec<f64> = problem.weights().collect();
     for (carrier, when, covariate) in each(PERIODIC) {

@@ -106,7 +106,7 @@ impl Sight {
         let apart = (APART_SHARE * (most - least)).max(1e-3 * most.abs().max(least.abs()));
         let mut knots: Vec<f64> = Vec::new();
         for knot in 0..count {
-            let value = values[knot * (values.len() - 1) / (count - 1)];
+            let value = values[knot * (values.len() - 1) / (count - 1).max(1)];
             if knots.last().is_none_or(|last| value - last > apart) {
                 knots.push(value);
             }

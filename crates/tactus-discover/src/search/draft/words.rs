@@ -24,6 +24,13 @@ pub(super) fn named(sight: &Sight, atom: &Atom, law: Law, number: usize) -> Draf
     draft
 }
 
+/// A draft without its curve.
+pub(super) fn of_atom(atom: &Atom) -> String {
+    let covariates: Vec<&str> = atom.covariates.iter().map(|covariate| covariate.name()).collect();
+    let kind = if atom.per_unit.is_some() { "a tone in" } else { "by" };
+    format!("{} {}, {kind} {}", atom.carrier.name(), atom.when.name(), covariates.join(" and "))
+}
+
 /// What a draft is, in one sentence.
 pub(super) fn sentence(draft: &Draft) -> String {
     let when = match draft.when {
@@ -67,6 +74,9 @@ pub(super) fn sentence(draft: &Draft) -> String {
     let [least, most] = extent(draft);
     let (scale, of) =
         if draft.carrier.unit() == "share" { (100.0, "%") } else { (1.0, draft.carrier.unit()) };
+    if let Law::Linear { offset, slope: 0.0 } = &draft.law {
+        return format!("{}, {what}{own} that is constant: {} {of}", capital(when), number(scale * offset));
+    }
     format!(
         "{}, {what}{own} that follows the {}, {how}: {} to {} {of}",
         capital(when),
@@ -99,7 +109,13 @@ fn number(value: f64) -> String {
     let places = (2.0 - digits).clamp(0.0, 6.0);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 6")]
     let places = places as usize;
-    format!("{value:.places$}")
+    let told = format!("{value:.places$}");
+    // A law that begins at 0 may end up a hair below it.
+    if told.trim_start_matches('-').chars().all(|letter| matches!(letter, '0' | '.')) {
+        "0".into()
+    } else {
+        told
+    }
 }
 
 fn capital(words: &str) -> String {

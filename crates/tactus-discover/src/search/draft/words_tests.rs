@@ -18,7 +18,7 @@ fn a_draft_is_told_in_one_sentence() {
     assert_eq!(
         sentence(&draft),
         "While the tool touches, the signal changes by a share that follows the sum of signals, levelling off with a length of 1.000 mm: \
-         -19.6 to 0.00 %"
+         -19.6 to 0 %"
     );
     let grounded = Draft {
         carrier: Carrier::Counts,
@@ -30,7 +30,6 @@ fn a_draft_is_told_in_one_sentence() {
     };
     assert_eq!(
         sentence(&grounded),
-        "While the tool touches, counts are added, a number, with a weight for each element, that follows the depth, in a straight line: \
-         5.00 to 5.00 counts"
+        "While the tool touches, counts are added, a number, with a weight for each element, that is constant: 5.00 counts"
     );
 }

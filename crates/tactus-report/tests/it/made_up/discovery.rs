@@ -1,11 +1,12 @@
 //! Synthetic discoveries with known numbers.
 
 use tactus_discover::{
-    AddedEffect, BaseModel, Contest, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement,
-    Final, Floor, Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NotShown, OpenQuestion, Plan,
-    Point, Rivalry, Round, Split, Structured, TriedEffect, Unexplained, Verdict,
+    AddedEffect, BaseModel, Contest, Curve, Discovery, DraftedEffect, ElementGap, Estimated, FaultKind,
+    FaultyElement, Final, Floor, Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NotShown,
+    OpenQuestion, Plan, Point, Rivalry, Round, Split, Structured, TriedEffect, Unexplained, Verdict,
 };
-use tactus_model::{Array, Covering, Effect, Indenter, Psf, Response};
+use tactus_model::effect::{Carrier, Draft, Law, When};
+use tactus_model::{Array, Covariate, Covering, Effect, Indenter, Psf, Response};
 use tactus_report::discovery::{DataSource, DiscoveryReport};
 
 const NOISE_COUNTS: f64 = 2.0;
@@ -23,6 +24,36 @@ const COVARIATES: [(&str, &str, [f64; 2]); 12] = [
     ("neighbours' signal", "counts", [0.0, 800.0]),
     ("temperature", "deg C", [21.0, 24.0]),
 ];
+
+/// A draft with every kind of field filled: a law that passes through knots.
+pub(crate) fn draft() -> DraftedEffect {
+    DraftedEffect {
+        draft: Draft {
+            name: "draft-1".into(),
+            sentence:
+                "While the tool touches, the signal changes by a share <that> follows the sum of signals"
+                    .into(),
+            carrier: Carrier::OwnSignal,
+            when: When::InContact,
+            covariates: vec![Covariate::SumOfSignals],
+            ranges: vec![[0.0, 4.0]],
+            law: Law::Power { scale: -0.0125, exponent: 2.0 },
+            weights: None,
+        },
+        covariance: vec![vec![1e-6]],
+        knots: vec![[0.5, -0.003, 0.001], [2.0, -0.05, 0.002], [4.0, -0.2, f64::NAN]],
+        p_value: 0.000_5,
+        ln_odds: 244.4,
+        folds: 5,
+        nearest: vec![("saturation", 76.2), ("hardening", 98.0)],
+        alike: vec!["depth in contact, by temperature".into()],
+        closed_share: Some(0.93),
+        heldout_rms_before_counts: 3.45,
+        heldout_rms_after_counts: 2.11,
+        base: base(),
+        effects: vec![],
+    }
+}
 
 /// Two effects were found, one of them twice; a third was known before.
 pub(crate) fn explained() -> Discovery {
