@@ -148,7 +148,7 @@ fn a_draft_has_its_sentence_its_curve_and_what_speaks_for_it() {
         "badge warn\">drafted<",
         "Curve of draft-1",
         "power: scale \u{2212}0.0125, exponent 2.00",
-        "sum of signals, 0 to 4.00 mm",
+        "sum of signals, 0.00 to 4.00 mm",
         "saturation (76.2 behind)",
         "depth in contact, by temperature",
         "5 of 5",
