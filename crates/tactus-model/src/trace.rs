@@ -277,11 +277,11 @@ impl Covariate {
                 signal()? / largest.max(f64::MIN_POSITIVE)
             }
             Self::Distance => {
-                let [x, y] = seen.from_tip_mm(element)?;
+                let [x, y] = seen.offset_mm(element)?;
                 x.hypot(y)
             }
             Self::Ahead => {
-                let ([x, y], [along_x, along_y]) = (seen.from_tip_mm(element)?, trace.aside);
+                let ([x, y], [along_x, along_y]) = (seen.offset_mm(element)?, trace.aside);
                 (x * along_x + y * along_y) / along_x.hypot(along_y).max(1.0)
             }
             Self::Counts => *seen.counts.get(element)?,
@@ -291,7 +291,7 @@ impl Covariate {
 
 impl Seen<'_> {
     /// From the tip to an element's centre.
-    fn from_tip_mm(self, element: usize) -> Option<[f64; 2]> {
+    fn offset_mm(self, element: usize) -> Option<[f64; 2]> {
         let centre = self.array.centre_mm(element)?;
         Some(std::array::from_fn(|axis| centre[axis] - self.trace.position_mm[axis]))
     }

@@ -228,10 +228,8 @@ impl DraftStatus {
 
 impl RawDraft {
     pub(crate) fn of(draft: &Draft) -> Self {
-        let (at, values) = match &draft.law {
-            Law::Table { at, values } => (Some(at.clone()), Some(values.clone())),
-            _ => (None, None),
-        };
+        let table = if let Law::Table { at, values } = &draft.law { Some((at, values)) } else { None };
+        let (at, values) = table.map(|(at, values)| (at.clone(), values.clone())).unzip();
         let numbers = draft.law.numbers().into_iter().map(|(name, value)| (name.to_owned(), value));
         let covariates = draft.covariates.iter().zip(&draft.ranges);
         Self {
@@ -331,10 +329,7 @@ pub const fn stage_name(stage: PipelineStage) -> &'static str {
 
 /// How the curve joins what is there: a share multiplies.
 const fn combine(carrier: Carrier) -> &'static str {
-    match carrier {
-        Carrier::OwnSignal => "multiply",
-        _ => "add",
-    }
+    if matches!(carrier, Carrier::OwnSignal) { "multiply" } else { "add" }
 }
 
 #[cfg(test)]

@@ -115,7 +115,7 @@ impl Search<'_> {
         (self.progress)("drafting what nobody has named", 0.0);
         let atoms = grammar::atoms(self.problem, at, &sight, self.rounds);
         let count = atoms.len() as f64;
-        let (p_value, first) = self.screened(at, &sight, atoms)?;
+        let (p_value, first) = self.screened(at, &sight, &atoms)?;
         if p_value > ALPHA {
             return Ok(Err(NoDraft::Noise));
         }
@@ -158,11 +158,11 @@ impl Search<'_> {
         &self,
         at: &Fitted,
         sight: &Arc<Sight>,
-        atoms: Vec<Atom>,
+        atoms: &[Atom],
     ) -> Result<(f64, Vec<Atom>), DiscoverError> {
         let mut directions = Vec::new();
         let mut of_atoms: Vec<Range<usize>> = Vec::new();
-        for atom in &atoms {
+        for atom in atoms {
             let first = directions.len();
             directions.extend(sight.columns(atom));
             of_atoms.push(first..directions.len());

@@ -146,13 +146,10 @@ pub(crate) fn conclude(
             .map_or(0.0, |(tolerance, noise)| tolerance / noise),
     };
     let verdict = evidence.verdict();
-    let draft = match verdict {
-        Verdict::Unexplained | Verdict::PartlyExplained if options.rule == Rule::Protocol => {
-            let noise_counts = floor.rms_counts().unwrap_or(0.0);
-            Some(drafted(prepared, search, &grown, &of_grown, noise_counts)?)
-        }
-        _ => None,
-    };
+    let is_open = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
+    let draft = (is_open && options.rule == Rule::Protocol)
+        .then(|| drafted(prepared, search, &grown, &of_grown, floor.rms_counts().unwrap_or(0.0)))
+        .transpose()?;
     let squares = |level: Level| level.heldout_rms_counts.powi(2);
     let noise_square = floor.rms_counts().unwrap_or(0.0).powi(2);
     let gap = squares(base_level) - noise_square;
@@ -176,12 +173,7 @@ pub(crate) fn conclude(
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
     let mut warnings = prepared.warnings.clone();
     warnings.extend(prepared.not_judged(&of_grown, floor));
-    if !agreed.is_empty() {
-        warnings.push(format!(
-            "the presses are few: all their independent blocks agree with {}, but they are too few for a probability of {CONFIRMED_P}",
-            agreed.join(" and ")
-        ));
-    }
+    warnings.extend(few_presses(&agreed));
     Ok(Discovery {
         not_shown,
         warnings,
@@ -220,6 +212,16 @@ pub(crate) fn conclude(
         grown: base_of(prepared, &grown.parameters),
         gap: before.gap.clone(),
         ..prepared.unjudged(&of_base, base_level, options)?
+    })
+}
+
+/// A warning if effects are confirmed by all of too few blocks.
+fn few_presses(agreed: &[&str]) -> Option<String> {
+    let names = agreed.join(" and ");
+    (!agreed.is_empty()).then(|| {
+        format!(
+            "the presses are few: all their independent blocks agree with {names}, but they are too few for a probability of {CONFIRMED_P}"
+        )
     })
 }
 

@@ -187,7 +187,7 @@ impl Reach {
                 }
             }
             Self::Row => {
-                (0..cols).filter(|other| *other != col).for_each(|other| visit(row * cols + other, 1.0))
+                (0..cols).filter(|other| *other != col).for_each(|other| visit(row * cols + other, 1.0));
             }
             Self::Column => {
                 (0..rows).filter(|other| *other != row).for_each(|other| visit(other * cols + col, 1.0));

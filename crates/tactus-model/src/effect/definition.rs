@@ -160,10 +160,7 @@ impl Definition {
 
     /// The draft that it is made from; `None` for an effect with a name of its own.
     pub fn draft(&self) -> Option<&'static Draft> {
-        match self.make {
-            Make::Draft(draft) => Some(draft),
-            _ => None,
-        }
+        if let Make::Draft(draft) = self.make { Some(draft) } else { None }
     }
 
     /// True if knots in place of the formula replace a parameter.

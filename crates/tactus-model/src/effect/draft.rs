@@ -144,7 +144,7 @@ impl Carrier {
         match self {
             Self::OwnSignal | Self::Neighbours => "share",
             Self::Counts => "counts",
-            _ => "mm",
+            Self::Depth | Self::X | Self::Y | Self::EveryElement | Self::PressHere | Self::PressThere => "mm",
         }
     }
 }
@@ -228,6 +228,33 @@ impl Law {
             _ => return None,
         };
         (law.numbers().len() == numbers.len()).then_some(law)
+    }
+
+    /// What must be otherwise, for so many covariates.
+    fn check(&self, count: usize) -> Result<(), String> {
+        let numbers = self.numbers();
+        if let Some((name, value)) = numbers.iter().find(|(_, value)| !value.is_finite()) {
+            return Err(format!("{name} must be finite, not {value}"));
+        }
+        if numbers.iter().any(|(name, value)| *name == "length" && *value <= 0.0) {
+            return Err("length must be above 0".into());
+        }
+        let Self::Table { at, values } = self else {
+            return if count == 1 { Ok(()) } else { Err("two covariates need a table".into()) };
+        };
+        let size: usize = at.iter().map(Vec::len).product();
+        if at.len() != count || size != values.len() || !(1..=TABLE_MAX).contains(&size) {
+            return Err(format!(
+                "a table must have places for each covariate, and 1 to {TABLE_MAX} values, one for each"
+            ));
+        }
+        let is_ordered = |places: &Vec<f64>| {
+            places.iter().all(|place| place.is_finite()) && places.windows(2).all(|two| two[0] < two[1])
+        };
+        if !at.iter().all(is_ordered) || values.iter().any(|value| !value.is_finite()) {
+            return Err("a table must have finite places in order, and finite values".into());
+        }
+        Ok(())
     }
 
     /// Its value at one covariate, or two of a table.
@@ -336,32 +363,7 @@ impl Draft {
         if self.covariates.contains(&Covariate::Counts) && self.carrier != Carrier::Counts {
             return Err("only what is added to counts can depend on counts".into());
         }
-        let numbers = self.law.numbers();
-        if let Some((name, value)) = numbers.iter().find(|(_, value)| !value.is_finite()) {
-            return Err(format!("{name} must be finite, not {value}"));
-        }
-        if numbers.iter().any(|(name, value)| *name == "length" && *value <= 0.0) {
-            return Err("length must be above 0".into());
-        }
-        match &self.law {
-            Law::Table { at, values } => {
-                let size: usize = at.iter().map(Vec::len).product();
-                if at.len() != count || size != values.len() || !(1..=TABLE_MAX).contains(&size) {
-                    return Err(format!(
-                        "a table must have places for each covariate, and 1 to {TABLE_MAX} values, one for each"
-                    ));
-                }
-                let is_ordered = |places: &Vec<f64>| {
-                    places.iter().all(|place| place.is_finite())
-                        && places.windows(2).all(|two| two[0] < two[1])
-                };
-                if !at.iter().all(is_ordered) || values.iter().any(|value| !value.is_finite()) {
-                    return Err("a table must have finite places in order, and finite values".into());
-                }
-            }
-            _ if count > 1 => return Err("two covariates need a table".into()),
-            _ => {}
-        }
+        self.law.check(count)?;
         if self.weights.iter().flatten().any(|weight| !weight.is_finite()) {
             return Err("its weights must be finite".into());
         }
@@ -463,10 +465,12 @@ impl OnMotion for Drafted {
         }
         let seen = Seen { trace: &self.trace, array: now.base.model.array(), signal_mm: &[], counts: &[] };
         let by_mm = self.strength * self.draft.value(seen, 0);
-        match self.draft.carrier {
-            Carrier::X => shift(tip, [by_mm, 0.0]),
-            Carrier::Y => shift(tip, [0.0, by_mm]),
-            _ => tip.surface_mm += by_mm,
+        if self.draft.carrier == Carrier::X {
+            shift(tip, [by_mm, 0.0]);
+        } else if self.draft.carrier == Carrier::Y {
+            shift(tip, [0.0, by_mm]);
+        } else {
+            tip.surface_mm += by_mm;
         }
     }
 
@@ -506,7 +510,9 @@ impl OnCovering for Drafted {
                     *u += by_mm * image;
                 }
             }
-            _ => signal_mm.iter_mut().zip(&self.values).for_each(|(u, by_mm)| *u += by_mm),
+            Carrier::Depth | Carrier::X | Carrier::Y | Carrier::EveryElement | Carrier::Counts => {
+                signal_mm.iter_mut().zip(&self.values).for_each(|(u, by_mm)| *u += by_mm);
+            }
         }
     }
 

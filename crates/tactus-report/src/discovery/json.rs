@@ -430,10 +430,8 @@ impl<'a> DraftJson<'a> {
 impl<'a> DraftedJson<'a> {
     fn of(found: &'a DraftedEffect) -> Self {
         let draft = &found.draft;
-        let (at, values) = match &draft.law {
-            Law::Table { at, values } => (Some(at.as_slice()), Some(values.as_slice())),
-            _ => (None, None),
-        };
+        let table = if let Law::Table { at, values } = &draft.law { Some((at, values)) } else { None };
+        let (at, values) = table.map(|(at, values)| (at.as_slice(), values.as_slice())).unzip();
         let place = |(covariate, range): (&Covariate, &[f64; 2])| GapPlaceJson {
             covariate: covariate.name(),
             unit: covariate.unit(),

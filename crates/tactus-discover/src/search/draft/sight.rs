@@ -68,13 +68,13 @@ impl Sight {
             units: Vec::new(),
         };
         for carrier in Carrier::ALL {
-            sight.units.push((carrier, sight.unit(problem, at, carrier)?));
+            sight.units.push((carrier, Self::unit(problem, at, carrier)?));
         }
         Ok(sight)
     }
 
     /// The change of each reading by a unit of a carrier.
-    fn unit(&self, problem: &Problem<'_>, at: &Fitted, carrier: Carrier) -> Result<Vec<f32>, DiscoverError> {
+    fn unit(problem: &Problem<'_>, at: &Fitted, carrier: Carrier) -> Result<Vec<f32>, DiscoverError> {
         #[expect(clippy::cast_possible_truncation, reason = "as precise as a direction needs to be")]
         let single = |value: f64| value as f32;
         if carrier == Carrier::Counts {
@@ -160,12 +160,12 @@ impl Sight {
     }
 
     /// A reading's value and the square of what a tone would multiply, for the spectrum of a covariate.
-    pub(super) fn points<'a>(
-        &'a self,
+    pub(super) fn points(
+        &self,
         carrier: Carrier,
         covariate: Covariate,
         when: When,
-    ) -> impl Iterator<Item = (usize, f64, f64)> + Clone + 'a {
+    ) -> impl Iterator<Item = (usize, f64, f64)> + Clone + '_ {
         let unit = self.unit_of(carrier);
         let bins = (0..self.traces.len()).filter(move |bin| when.is_now(&self.traces[*bin]));
         bins.flat_map(move |bin| {
@@ -257,7 +257,9 @@ impl Sight {
                 curve = vec![1.0; knots];
                 break;
             }
-            curve.iter_mut().for_each(|one| *one /= most);
+            for one in &mut curve {
+                *one /= most;
+            }
         }
         Atom { curve: Some(Arc::new(curve)), ..atom }
     }

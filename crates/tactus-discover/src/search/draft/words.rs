@@ -92,12 +92,11 @@ fn unit(draft: &Draft) -> &'static str {
 
 /// The least and the greatest value of a draft within the range of its data.
 fn extent(draft: &Draft) -> [f64; 2] {
-    let values: Vec<f64> = match &draft.law {
-        Law::Table { values, .. } => values.clone(),
-        law => {
-            let [from, to] = draft.ranges[0];
-            (0..=100).map(|step| law.value(&[from + (to - from) * f64::from(step) / 100.0])).collect()
-        }
+    let values: Vec<f64> = if let Law::Table { values, .. } = &draft.law {
+        values.clone()
+    } else {
+        let [from, to] = draft.ranges[0];
+        (0..=100).map(|step| draft.law.value(&[from + (to - from) * f64::from(step) / 100.0])).collect()
     };
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
     [least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
