@@ -4,12 +4,15 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::ThreadPoolBuilder;
 use tactus_model::Effect;
+use tactus_model::effect::Definition;
 
 use crate::data::{Bins, DiscoverError, Floor, Frames, Known};
 use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
 use crate::next::Experiments;
 use crate::search::{Candidate, Formed, Grown, Memory, Options, Rule, Search, not_shown};
-use crate::verdict::{BaseModel, Discovery, SearchOutcome, cannot_judge, conclude, confirmed};
+use crate::verdict::{
+    BaseModel, Confirmation, Discovery, SearchOutcome, cannot_judge, conclude, confirmation, confirmed,
+};
 
 /// Progress of a discovery.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,6 +108,20 @@ fn discover_on_threads(
     )?;
     reporter.report("done", 1.0);
     Ok(told)
+}
+
+/// Compares a draft with new data: how strong it is there, and how much it closes of what a model leaves without it. The model's effects are
+/// fitted again, its gains and zeros too.
+///
+/// # Errors
+/// [`DiscoverError`] if the data do not suffice or the model is invalid.
+pub fn confirm(
+    known: &Known,
+    frames: &Frames,
+    draft: &'static Definition,
+    seed: u64,
+) -> Result<Confirmation, DiscoverError> {
+    confirmation(&Prepared::new(known, frames, seed)?, draft)
 }
 
 /// Counts that a model predicts for every frame, without noise: frame by frame, element by element.

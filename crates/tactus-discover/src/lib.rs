@@ -15,7 +15,7 @@ mod search;
 mod verdict;
 
 pub use data::{DiscoverError, Floor, Frames, Known};
-pub use discover::{Progress, discover, predict};
+pub use discover::{Progress, confirm, discover, predict};
 pub use fit::RunWalks;
 pub use next::{
     Experiments, LeftOut, NextExperiment, OpenQuestion, Plan, Rehearsal, RehearsalOrder, WORTH_Z,
@@ -25,6 +25,6 @@ pub use search::{
 };
 pub use tactus_calibrate::{FaultKind, FaultyElement};
 pub use verdict::{
-    AddedEffect, BaseModel, Discovery, DraftedEffect, ElementGap, Estimated, Final, FittedCurve, FittedKnot,
-    GlobalTest, Inclusion, Level, Split, Structured, Unexplained, Verdict,
+    AddedEffect, BaseModel, Confirmation, Discovery, DraftedEffect, ElementGap, Estimated, Final,
+    FittedCurve, FittedKnot, GlobalTest, Inclusion, Level, Split, Structured, Unexplained, Verdict,
 };

@@ -54,6 +54,22 @@ pub(crate) struct Pair {
     pub(crate) gain: f64,
 }
 
+/// A model with a draft, and without it.
+#[derive(Debug, Clone)]
+pub(crate) struct DraftModel {
+    pub(crate) name: &'static str,
+    pub(crate) with: Parameters,
+    pub(crate) without: Parameters,
+}
+
+impl Explanation {
+    /// Experiments that show the effect.
+    fn shown_by(&self) -> &'static [&'static str] {
+        let term = self.parameters.terms.iter().find(|term| term.definition.name == self.name);
+        term.map_or(&[], |term| term.definition.shown_by)
+    }
+}
+
 /// What the data leave open.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Open<'a> {
@@ -61,6 +77,8 @@ pub(crate) struct Open<'a> {
     /// Effects that the data cannot show, and the model to which they would be added.
     pub(crate) not_shown: &'a [NotShown],
     pub(crate) at: &'a Parameters,
+    /// A draft that a new measurement should confirm.
+    pub(crate) draft: Option<&'a DraftModel>,
     /// The data do not suffice for a verdict: repeats are proposed first.
     pub(crate) lacks_repeats: bool,
 }
@@ -110,8 +128,7 @@ impl Planner<'_> {
         }
         for pair in open.pairs {
             let separates = pair.of.each_ref().map(|one| one.name.to_owned());
-            let [one, other] = pair.of.each_ref().map(|one| Definition::find(one.name));
-            let shown_by = [one?.shown_by, other?.shown_by].concat();
+            let shown_by = pair.of.each_ref().map(Explanation::shown_by).concat();
             // The linear prediction promises too much of what the definitions do not name.
             let is_first = |one: &Candidate| one.is_own || shown_by.contains(&one.name.as_str());
             let is_other = |one: &Candidate| !is_first(one) && one.name != FLOOR;
@@ -123,6 +140,12 @@ impl Planner<'_> {
                 answer = answer.or(other);
             }
             plan.take(answer, separates, PROPOSALS_MAX);
+        }
+        if let Some(DraftModel { name, with, without }) = open.draft {
+            let separates = [(*name).to_owned(), "noise".to_owned()];
+            let is_any = |one: &Candidate| one.name != FLOOR;
+            let expect = |design: &Design<'_>| self.beyond(design, with, without);
+            plan.take(rehearsals.answer(&separates, is_any, expect)?, separates, 1);
         }
         for NotShown { effect, .. } in open.not_shown {
             let separates = [(*effect).to_owned(), "nothing".to_owned()];
@@ -158,6 +181,24 @@ impl Planner<'_> {
                 wrong(&one, &predicted[0], &predicted[1])?.min(wrong(&other, &predicted[1], &predicted[0])?);
             let gap = wrong(&without, &predicted[2], &predicted[0])?;
             Ok(Expected { z, share: z * z / (pair.gain + gap * gap).max(f64::MIN_POSITIVE) })
+        })
+    }
+
+    /// How well a design shows a draft: what a fit of the model without it would leave.
+    fn beyond(
+        self,
+        design: &Design<'_>,
+        with: &Parameters,
+        without: &Parameters,
+    ) -> Result<Expected, DiscoverError> {
+        self.on(design, |problem| {
+            let [with, without] = [with, without].map(once);
+            let (more, less) = (problem.predict(&with)?, problem.predict(&without)?);
+            let change = more.iter().zip(&less).map(|(more, less)| more - less).collect();
+            let columns = vec![Direction::of(change, self.frames.elements)];
+            let z = problem.sizes(&without, &less, columns)?.into_iter().sum();
+            // There is no other explanation that would close any of it.
+            Ok(Expected { z, share: 1.0 })
         })
     }
 

@@ -47,7 +47,7 @@ fn planner<'a>(
 fn planned(pairs: &[Pair], experiments: &ShippedRig) -> Plan {
     let (known, frames, noise) = (known(), measured(), noise());
     let at = Parameters::declared(&known, 1);
-    let open = Open { pairs, not_shown: &[], at: &at, lacks_repeats: false };
+    let open = Open { pairs, not_shown: &[], at: &at, draft: None, lacks_repeats: false };
     planner(&known, &frames, &noise, experiments).plan(open).unwrap()
 }
 
@@ -204,7 +204,7 @@ fn an_effect_that_the_data_cannot_show_gets_an_experiment_of_its_own() {
     let (known, frames, noise, rig) = (known(), measured(), noise(), ShippedRig::new(1.0));
     let not_shown = [NotShown { effect: "relaxation", reason: "no depth was held".into() }];
     let at = Parameters::declared(&known, 1);
-    let open = Open { pairs: &[], not_shown: &not_shown, at: &at, lacks_repeats: false };
+    let open = Open { pairs: &[], not_shown: &not_shown, at: &at, draft: None, lacks_repeats: false };
     let plan = planner(&known, &frames, &noise, &rig).plan(open).unwrap();
     let [one] = &plan.next[..] else { panic!("one proposal: {plan:?}") };
     assert_eq!(

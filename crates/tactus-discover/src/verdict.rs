@@ -26,5 +26,6 @@ pub use discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
     Inclusion, Level, Split, Unexplained, Verdict,
 };
-pub use drafting::DraftedEffect;
+pub(crate) use drafting::confirmation;
+pub use drafting::{Confirmation, DraftedEffect};
 pub use structured::Structured;

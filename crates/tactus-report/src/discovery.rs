@@ -53,6 +53,8 @@ pub struct DiscoveryReport<'a> {
     pub active: &'a [ActiveRun],
     /// Why no further experiment was run, although there was a round for it.
     pub active_ended: Option<&'a str>,
+    /// What those experiments say of drafts, one sentence each.
+    pub settled: &'a [String],
     /// What discovery found, to be shown.
     pub discovery: &'a Discovery,
 }

@@ -49,6 +49,24 @@ pub struct DraftFile {
     pub nearest: Vec<Nearest>,
     /// The data that it was drafted from; `None` if it was only stated.
     pub evidence: Option<DraftEvidence>,
+    /// What a new measurement says; `None` before there is one.
+    pub confirmation: Option<DraftConfirmation>,
+}
+
+/// What a new measurement says of a draft.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DraftConfirmation {
+    /// The new data, by id, with the SHA-256 of the file.
+    pub data: BTreeMap<String, String>,
+    /// The strength of the draft there; 1 as it was drafted.
+    pub strength: f64,
+    /// Standard error of the strength.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strength_se: Option<f64>,
+    /// Share of what is left without it that it closes there, on presses that were not fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed_share: Option<f64>,
 }
 
 /// What became of a draft.
@@ -132,6 +150,8 @@ struct RawFile {
     nearest: Vec<Nearest>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     evidence: Option<DraftEvidence>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    confirmation: Option<DraftConfirmation>,
 }
 
 /// A draft as draft files and model files hold it.
@@ -181,6 +201,7 @@ impl DraftFile {
             covariance: raw.covariance,
             nearest: raw.nearest,
             evidence: raw.evidence,
+            confirmation: raw.confirmation,
         })
     }
 
@@ -196,6 +217,7 @@ impl DraftFile {
             covariance: self.covariance.clone(),
             nearest: self.nearest.clone(),
             evidence: self.evidence.clone(),
+            confirmation: self.confirmation.clone(),
         })
     }
 

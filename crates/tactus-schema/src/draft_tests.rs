@@ -1,7 +1,7 @@
 use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, Draft, Law, When};
 
-use super::{DraftEvidence, DraftFile, DraftStatus, Nearest};
+use super::{DraftConfirmation, DraftEvidence, DraftFile, DraftStatus, Nearest};
 use crate::model::Model;
 
 const STATED: &str = r#"
@@ -49,6 +49,12 @@ fn file() -> DraftFile {
             ln_odds: 103.25,
             folds: 5,
             closed_share: Some(0.93),
+        }),
+        confirmation: Some(DraftConfirmation {
+            data: [("run-2".to_owned(), "11ee".to_owned())].into(),
+            strength: 1.0 / 3.0,
+            strength_se: Some(0.02),
+            closed_share: None,
         }),
     }
 }

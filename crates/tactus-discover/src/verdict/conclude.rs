@@ -147,9 +147,10 @@ pub(crate) fn conclude(
     };
     let verdict = evidence.verdict();
     let is_open = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
-    let draft = (is_open && options.rule == Rule::Protocol)
+    let (draft, with_draft) = (is_open && options.rule == Rule::Protocol)
         .then(|| drafted(prepared, search, &grown, &of_grown, floor.rms_counts().unwrap_or(0.0)))
-        .transpose()?;
+        .transpose()?
+        .map_or((None, None), |(draft, model)| (Some(draft), model));
     let squares = |level: Level| level.heldout_rms_counts.powi(2);
     let noise_square = floor.rms_counts().unwrap_or(0.0).powi(2);
     let gap = squares(base_level) - noise_square;
@@ -167,6 +168,7 @@ pub(crate) fn conclude(
         pairs: &pairs,
         not_shown: &not_shown,
         at: &grown.parameters,
+        draft: with_draft.as_ref(),
         lacks_repeats: verdict == Verdict::CannotJudge,
     })?;
 
@@ -257,7 +259,8 @@ pub(crate) fn cannot_judge(
 ) -> Result<Discovery, DiscoverError> {
     let of_base = prepared.held(&prepared.base.parameters)?;
     let unjudged = prepared.unjudged(&of_base, prepared.level(&of_base, prepared.floor), options)?;
-    let nothing = Open { pairs: &[], not_shown: &[], at: &prepared.base.parameters, lacks_repeats: true };
+    let at = &prepared.base.parameters;
+    let nothing = Open { pairs: &[], not_shown: &[], at, draft: None, lacks_repeats: true };
     Ok(Discovery { plan: prepared.planner(experiments, options).plan(nothing)?, ..unjudged })
 }
 

@@ -1,13 +1,14 @@
 //! The draft of what a grown model leaves, and how much of it that closes on presses that nobody had opened.
 
 use tactus_model::Effect;
-use tactus_model::effect::Draft;
+use tactus_model::effect::{Definition, Draft};
 
 use super::discovery::BaseModel;
 use super::held_out::HeldOutResidual;
 use crate::data::DiscoverError;
-use crate::fit::{Fitted, Prepared};
-use crate::search::{Drafted, NoDraft, Search};
+use crate::fit::{Fitted, Prepared, Term};
+use crate::next::DraftModel;
+use crate::search::{Drafted, NoDraft, POLISH_ROUNDS, Search};
 
 /// A draft that closes less of what was left on held-out presses is partial.
 const CLOSED_LEAST: f64 = 0.7;
@@ -57,17 +58,24 @@ pub(super) fn drafted(
     grown: &Fitted,
     of_grown: &HeldOutResidual,
     noise_counts: f64,
-) -> Result<Result<Box<DraftedEffect>, NoDraft>, DiscoverError> {
-    let number = 1 + prepared.known.drafts.len();
+) -> Result<(Result<Box<DraftedEffect>, NoDraft>, Option<DraftModel>), DiscoverError> {
+    let known = &prepared.known.effects;
+    let of_model = known.iter().filter(|effect| effect.definition().draft().is_some()).count();
+    let number = 1 + prepared.known.drafts.len() + of_model;
     let found = match search.draft(grown, number)? {
         Ok(found) => *found,
-        Err(none) => return Ok(Err(none)),
+        Err(none) => return Ok((Err(none), None)),
     };
     let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest, alike } = found;
     let after = prepared.held(&at.parameters)?;
     let [before, after] = [of_grown.rms_counts, after.rms_counts];
     let left = before * before - noise_counts * noise_counts;
-    Ok(Ok(Box::new(DraftedEffect {
+    let model = at.parameters.terms.last().map(|term| DraftModel {
+        name: term.definition.name,
+        with: at.parameters.clone(),
+        without: grown.parameters.clone(),
+    });
+    let found = DraftedEffect {
         draft,
         covariance,
         knots,
@@ -81,7 +89,62 @@ pub(super) fn drafted(
         heldout_rms_after_counts: after,
         base: super::conclude::base_of(prepared, &at.parameters),
         effects: at.parameters.effects()?,
-    })))
+    };
+    Ok((Ok(Box::new(found)), model))
+}
+
+/// What a new measurement says of a draft.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Confirmation {
+    /// Its strength there; 1 as it was drafted.
+    pub strength: f64,
+    /// Standard error of the strength.
+    pub strength_se: Option<f64>,
+    /// Share of what the model leaves without it that it closes on presses that were not fitted; `None` where nothing is left there.
+    pub closed_share: Option<f64>,
+    /// Root mean square of the residual on those presses without it.
+    pub heldout_rms_before_counts: f64,
+    /// With it.
+    pub heldout_rms_after_counts: f64,
+}
+
+/// A new measurement confirms a draft that closes so much of what is left there,
+const CONFIRMED_LEAST: f64 = 0.8;
+/// and whose strength there differs from 1 by no more than this, or by no more than so many standard errors.
+const STRENGTH_APART: f64 = 0.3;
+const STRENGTH_SE: f64 = 3.0;
+
+impl Confirmation {
+    /// True if the draft holds.
+    pub fn holds(&self) -> bool {
+        let apart = (self.strength - 1.0).abs();
+        let is_as_strong =
+            apart <= STRENGTH_APART || self.strength_se.is_some_and(|error| apart <= STRENGTH_SE * error);
+        self.closed_share.is_some_and(|share| share >= CONFIRMED_LEAST) && is_as_strong
+    }
+}
+
+/// Compares a draft with data that it was not drafted from.
+pub(crate) fn confirmation(
+    prepared: &Prepared<'_>,
+    draft: &'static Definition,
+) -> Result<Confirmation, DiscoverError> {
+    let base = &prepared.base.parameters;
+    let with = Term { values: vec![1.0], ..Term::neutral(draft) };
+    let fitted = prepared.problem().fit_from(base.with(with), POLISH_ROUNDS)?;
+    let (before, after) = (prepared.held(base)?, prepared.held(&fitted.parameters)?);
+    let noise_counts = prepared.floor_of(&after).rms_counts().unwrap_or(0.0);
+    let [before, after] = [before.rms_counts, after.rms_counts];
+    let left = before * before - noise_counts * noise_counts;
+    let last = fitted.parameters.terms.last().zip(fitted.errors.last());
+    let (strength, error) = last.map_or((0.0, f64::NAN), |(term, errors)| (term.values[0], errors[0]));
+    Ok(Confirmation {
+        strength,
+        strength_se: Some(error).filter(|error| error.is_finite()),
+        closed_share: (left > 0.0).then(|| ((before * before - after * after) / left).min(1.0)),
+        heldout_rms_before_counts: before,
+        heldout_rms_after_counts: after,
+    })
 }
 
 #[cfg(test)]

@@ -89,5 +89,8 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
             AmbiguousEffect::in_words(&run.after),
         ]);
     }
+    for sentence in report.settled {
+        writeln!(f, "<p>{}</p>", Text(sentence))?;
+    }
     writeln!(f, "{table}\n<p>All these recordings are among the data of this report.</p>\n</section>")
 }

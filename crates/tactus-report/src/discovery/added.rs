@@ -22,7 +22,8 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
         writeln!(f, "<p>Nothing.</p>")?;
     }
     for step in &found.steps {
-        self::step(f, step)?;
+        let own = found.effects.iter().find(|effect| effect.name() == step.effect).map(Effect::definition);
+        self::step(f, step, own)?;
     }
     let mut known: Vec<&str> = found.effects.iter().map(Effect::name).collect();
     known.retain(|name| found.steps.iter().all(|step| step.effect != *name));
@@ -63,8 +64,9 @@ fn inclusions(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     Ok(())
 }
 
-fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect) -> fmt::Result {
-    let definition = Definition::find(step.effect).ok();
+fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect, own: Option<&Definition>) -> fmt::Result {
+    // A draft is in no registry, and a random walk is no effect of the model.
+    let definition = own.or_else(|| Definition::find(step.effect).ok());
     let summary = definition.map_or("", |definition| definition.summary);
     writeln!(f, "<h3>{}</h3>\n<p>{}.</p>", Text(step.effect), Text(capital(summary)))?;
     let mut nth = 0;

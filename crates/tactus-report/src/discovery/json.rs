@@ -67,6 +67,7 @@ struct ReportJson<'a> {
     left_out: Vec<LeftOutJson<'a>>,
     active: Vec<ActiveRunJson<'a>>,
     active_ended: Option<&'a str>,
+    settled: &'a [String],
 }
 
 #[derive(Serialize)]
@@ -414,6 +415,7 @@ impl<'a> ReportJson<'a> {
             left_out: found.plan.left_out.iter().map(LeftOutJson::of).collect(),
             active: report.active.iter().map(ActiveRunJson::of).collect(),
             active_ended: report.active_ended,
+            settled: report.settled,
         }
     }
 }

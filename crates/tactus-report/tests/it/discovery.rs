@@ -204,7 +204,13 @@ fn the_json_keeps_its_form_to_the_byte() {
         after: vec![undecided(vec![])],
     }];
     let (array, data, notes) = (Array::digitacts(), data(), ["one note".to_owned()]);
-    let report = DiscoveryReport { notes: &notes, active: &active, ..report(&array, &data, &discovery) };
+    let settled = ["draft-1 is confirmed".to_owned()];
+    let report = DiscoveryReport {
+        notes: &notes,
+        active: &active,
+        settled: &settled,
+        ..report(&array, &data, &discovery)
+    };
     let text = discovery_json(&report);
     if env::var_os("TACTUS_WRITE_GOLDEN").is_some() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/golden/discovery.json");

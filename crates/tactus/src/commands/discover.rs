@@ -6,6 +6,7 @@ mod measurements;
 mod model;
 mod print;
 mod residuals;
+mod settled;
 mod twin_experiments;
 mod unfinished;
 
@@ -20,7 +21,7 @@ use tactus_model::effect::Definition;
 use tactus_report::discovery::{
     ActiveRun, DataSource, DiscoveryReport, discovery_html, discovery_json, draft_status,
 };
-use tactus_schema::draft::{DraftEvidence, DraftFile, Nearest};
+use tactus_schema::draft::{DraftEvidence, DraftFile, DraftStatus, Nearest};
 use tactus_schema::{Model, Rig};
 
 use crate::cli::{Ablation, Common, DiscoverArgs};
@@ -45,6 +46,9 @@ struct Discovered {
     active: Vec<ActiveRun>,
     /// Why `--active` ran no further experiment, although there was a round for it.
     active_ended: Option<String>,
+    /// Drafts of which an experiment of `--active` has told whether they hold, and a sentence on each.
+    settled: Vec<DraftFile>,
+    settled_in_words: Vec<String>,
 }
 
 /// The rig on which experiments would run.
@@ -63,18 +67,21 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     let progress = ComputationProgress::new(common.json);
     let declared = args.model.as_deref().map(declared).transpose()?;
     let folder = UnfinishedFolder::create(&args.out)?;
-    let analyse =
-        |files: &[PathBuf], live: Option<&LiveRig>| analysed(args, declared.clone(), files, live, &progress);
+    let library = args.library.as_deref().map(library::read).transpose()?.unwrap_or_default();
+    let analyse = |files: &[PathBuf], live: Option<&LiveRig>, drafts: &[&'static Definition]| {
+        let drafts = [&library, drafts].concat();
+        analysed(args, declared.clone(), files, live, &drafts, &progress)
+    };
     let discovered = if args.active {
         active::discover(common, args, &progress, analyse)?
     } else {
-        analyse(&args.files, None)?
+        analyse(&args.files, None, &[])?
     };
     progress.show("writing", 1.0);
     discovered.write(folder.path())?;
     folder.finish()?;
-    let draft = discovered.draft()?.map(|(name, _)| name);
-    let names = FILES.into_iter().chain(draft.as_deref());
+    let drafts = discovered.drafts()?;
+    let names = FILES.into_iter().chain(drafts.iter().map(|(name, _)| name.as_str()));
     let paths = names.map(|name| std::path::absolute(args.out.join(name))).collect::<Result<Vec<_>, _>>()?;
     progress.clear();
     if common.json {
@@ -91,6 +98,7 @@ fn analysed(
     declared: Option<Model>,
     files: &[PathBuf],
     live: Option<&LiveRig>,
+    drafts: &[&'static Definition],
     progress: &ComputationProgress,
 ) -> anyhow::Result<Discovered> {
     progress.show("reading", 0.0);
@@ -108,8 +116,7 @@ fn analysed(
             Model::of_rig(&measured.rig).context("the rig's reference indenter is not among its tools")?
         }
     };
-    let drafts = args.library.as_deref().map(library::read).transpose()?.unwrap_or_default();
-    let known = known(&measured.rig, &model, &drafts);
+    let known = known(&measured.rig, &model, drafts);
     let threads = args.threads.map_or_else(cores, usize::from);
     let rule = match args.ablation {
         None => Rule::Protocol,
@@ -128,7 +135,16 @@ fn analysed(
         DiscoverError::Model(_) | DiscoverError::Effect(_) | DiscoverError::Threads { .. } => error.into(),
     })?;
     discovery.warnings.extend(measured.renamed.clone());
-    Ok(Discovered { measured, model, known, discovery, active: Vec::new(), active_ended: None })
+    Ok(Discovered {
+        measured,
+        model,
+        known,
+        discovery,
+        active: Vec::new(),
+        active_ended: None,
+        settled: Vec::new(),
+        settled_in_words: Vec::new(),
+    })
 }
 
 impl Discovered {
@@ -142,19 +158,29 @@ impl Discovered {
         for (path, text) in [html, json, model].iter().zip(texts) {
             fs::write(path, text).with_context(|| path.display().to_string())?;
         }
-        if let Some((name, text)) = self.draft()? {
+        for (name, file) in self.drafts()? {
             let path = folder.join(name);
+            let text = file.to_toml().context("a draft")?;
             fs::write(&path, text).with_context(|| path.display().to_string())?;
         }
         residuals::write(self, &residuals)
     }
 
-    /// Name and text of the draft's file, if there is a draft.
-    fn draft(&self) -> anyhow::Result<Option<(String, String)>> {
+    /// The files of all drafts, with their names.
+    fn drafts(&self) -> anyhow::Result<Vec<(String, DraftFile)>> {
+        let named = |file: &DraftFile| {
+            let refuted = if file.status == DraftStatus::Refuted { "-refuted" } else { "" };
+            (format!("{}{refuted}.toml", file.draft.name), file.clone())
+        };
+        Ok(self.settled.iter().chain(&self.draft()?).map(named).collect())
+    }
+
+    /// The draft with what speaks for it, if there is one.
+    fn draft(&self) -> anyhow::Result<Option<DraftFile>> {
         let Some(Ok(found)) = &self.discovery.draft else { return Ok(None) };
         let hash = |source: &DataSource| (source.id.clone(), source.sha256.clone());
         let nearest = found.nearest.iter();
-        let file = DraftFile {
+        Ok(Some(DraftFile {
             draft: found.draft.clone(),
             status: draft_status(found),
             covariance: found.covariance.clone(),
@@ -169,8 +195,8 @@ impl Discovered {
                 folds: u32::try_from(found.folds)?,
                 closed_share: found.closed_share,
             }),
-        };
-        Ok(Some((format!("{}.toml", found.draft.name), file.to_toml().context("the draft")?)))
+            confirmation: None,
+        }))
     }
 
     fn report(&self) -> DiscoveryReport<'_> {
@@ -182,6 +208,7 @@ impl Discovered {
             notes: &self.measured.notes,
             active: &self.active,
             active_ended: self.active_ended.as_deref(),
+            settled: &self.settled_in_words,
             discovery: &self.discovery,
         }
     }

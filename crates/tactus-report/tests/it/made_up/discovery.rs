@@ -328,6 +328,7 @@ pub(crate) fn report<'a>(
         notes: &[],
         active: &[],
         active_ended: None,
+        settled: &[],
         discovery,
     }
 }

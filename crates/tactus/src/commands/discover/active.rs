@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use tactus_discover::{Discovery, NextExperiment, Verdict};
+use tactus_model::effect::Definition;
 use tactus_report::discovery::{ActiveRun, AmbiguousEffect, command, nothing_open, open};
 use tactus_runner::config;
 use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_schema::Rig;
 use tactus_schema::pb::ExitStatus;
 
+use super::settled::{self, Settled};
 use super::{Discovered, LiveRig};
 use crate::cli::{Common, DiscoverArgs, ExperimentArgs, LeaseArgs, RunArgs, RunSubject};
 use crate::commands::run::{RunSummary, execute};
@@ -45,7 +47,7 @@ pub(super) fn discover(
     common: &Common,
     args: &DiscoverArgs,
     progress: &ComputationProgress,
-    analyse: impl Fn(&[PathBuf], Option<&LiveRig>) -> anyhow::Result<Discovered>,
+    analyse: impl Fn(&[PathBuf], Option<&LiveRig>, &[&'static Definition]) -> anyhow::Result<Discovered>,
 ) -> anyhow::Result<Discovered> {
     let mut runner = ExperimentRunner::find(common, args)?;
     let mut files = args.files.clone();
@@ -54,8 +56,9 @@ pub(super) fn discover(
             runner.run(&ChosenExperiment::diagnose((runner.budget_s / 2.0 / DIAGNOSE_S).min(1.0)))?.recording,
         );
     }
-    let mut discovered = analyse(&files, Some(&runner.live))?;
+    let mut discovered = analyse(&files, Some(&runner.live), &[])?;
     let mut active: Vec<ActiveRun> = Vec::new();
+    let mut settled: Vec<Settled> = Vec::new();
     let mut active_ended = None;
     for nth in 1..=args.rounds {
         progress.clear();
@@ -85,11 +88,18 @@ pub(super) fn discover(
             });
             files.push(summary.recording);
         }
-        discovered = analyse(&files, Some(&runner.live))?;
+        let new = &files[files.len() - round.len()..];
+        if let Some(one) = settled::settle(&discovered, new)? {
+            runner.say(&one.in_words);
+            settled.push(one);
+        }
+        let holding: Vec<&'static Definition> = settled.iter().filter_map(|one| one.holding).collect();
+        discovered = analyse(&files, Some(&runner.live), &holding)?;
         let after = undecided(&discovered.discovery);
         active.extend(round.into_iter().map(|run| ActiveRun { after: after.clone(), ..run }));
     }
-    Ok(Discovered { active, active_ended, ..discovered })
+    let (files, in_words) = settled.into_iter().map(|one| (one.file, one.in_words)).unzip();
+    Ok(Discovered { active, active_ended, settled: files, settled_in_words: in_words, ..discovered })
 }
 
 /// The best affordable experiment for each undecided pair; `diagnose` if there is none and something is unexplained.
