@@ -13,6 +13,7 @@ use tactus_e2e::{CommandOutput, Process, repository, tactus};
 use tactus_record::rows;
 use tactus_record::table::TableWriter;
 use tactus_schema::DraftFile;
+use tactus_schema::draft::{DraftStatus, stage_name};
 use tactus_schema::table::Row;
 use tempfile::TempDir;
 
@@ -212,43 +213,64 @@ fn dead_elements_are_named_with_calibrates_evidence_and_the_grown_model_closes_t
     );
 }
 
-#[test]
-fn what_has_no_name_is_drafted_and_the_draft_holds_on_a_new_run_and_on_another_rig() {
+/// Hides physics that no effect of the library is, diagnoses the rig, and discovers with an experiment that confirms the draft. Then makes the
+/// experiment with another seed on that rig, on the rig without hidden physics, and on one with the draft in its model; and discovers
+/// with the draft in the library.
+fn is_drafted_and_confirmed(physics: &str, strength: f64, [stage, carrier, covariate]: [&str; 3]) {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
-    hide(folder, "supply-droop", 2.0);
+    hide(folder, physics, strength);
     let first = diagnosed(folder, &["--truth", "hidden.toml"], "1");
-    let said = tactus(folder, &["--json", "discover", &first]);
+    let on_rig = ["--embedded", "--rig-file", "rig.toml", "--truth", "hidden.toml"];
+    let said = tactus(folder, &[&["--json", "discover", &first, "--active"], &on_rig[..]].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
     let found = said.json();
-    let draft = &found["draft"];
-    let is = [&draft["stage"], &draft["carrier"], &draft["covariates"][0]["covariate"]];
-    assert_eq!(is, ["element", "own signal", "sum of signals"], "{} {draft}", found["steps"]);
+    let named = |found: &Value| -> Vec<Value> {
+        found["steps"].as_array().unwrap().iter().map(|step| step["effect"].clone()).collect()
+    };
+    let told =
+        format!("{} {} {} {}", found["settled"], found["steps"], found["draft"], found["active_ended"]);
+    assert!(
+        found["settled"][0].as_str().is_some_and(|one| one.starts_with("draft-1 is confirmed")),
+        "{told}"
+    );
+    assert_eq!(named(&found), ["draft-1"], "{told}");
     let file = fs::read_to_string(folder.join("discovery/draft-1.toml")).unwrap();
     let read = DraftFile::from_toml(&file).unwrap();
     assert_eq!(read.to_toml().unwrap(), file, "reading and writing it changes nothing");
-    let sha256 = read.evidence.unwrap().data.into_values().next();
-    assert_eq!(sha256.as_deref(), found["data"][0]["sha256"].as_str());
+    let draft = &read.draft;
+    let is = [stage_name(draft.stage()), draft.carrier.name(), draft.covariates[0].name()];
+    assert_eq!(is, [stage, carrier, covariate], "{file}");
+    let confirmation = read.confirmation.unwrap();
+    assert_eq!((read.status, confirmation.data.len()), (DraftStatus::Confirmed, 1), "{file}");
 
     let new = diagnosed(folder, &["--truth", "hidden.toml"], "2");
     let without = gap_counts(&new, &diagnosed(folder, &[], "2"));
     let grown = gap_counts(&new, &diagnosed(folder, &["--truth", "discovery/model.toml"], "2"));
     assert!(without.powi(2) > 5.0 * grown.powi(2), "{without} counts without, {grown} with the draft");
 
-    // A rig that has the draft in its model, and a discovery that has it in its library.
+    // Another rig has the draft in its model.
     fs::create_dir(folder.join("drafts")).unwrap();
     fs::copy(folder.join("discovery/draft-1.toml"), folder.join("drafts/draft-1.toml")).unwrap();
     let other = diagnosed(folder, &["--truth", "discovery/model.toml"], "3");
     let said = tactus(folder, &["--json", "discover", &other, "--library", "drafts", "--out", "other"]);
     assert_eq!(said.code, Some(0), "{said:?}");
-    let named: Vec<Value> =
-        said.json()["steps"].as_array().unwrap().iter().map(|step| step["effect"].clone()).collect();
-    assert_eq!(named, ["draft-1"], "{}", said.json()["draft"]);
+    assert_eq!(named(&said.json()), ["draft-1"], "{}", said.json()["draft"]);
 
     fs::write(folder.join("drafts/model.toml"), file.replace("tactus.draft/1", "tactus.model/1")).unwrap();
     let said = tactus(folder, &["discover", &other, "--library", "drafts", "--out", "refused"]);
     assert_eq!(said.code, Some(2), "{said:?}");
     assert!(said.err.contains("drafts/model.toml: schema: this program reads"), "{said:?}");
+}
+
+#[test]
+fn a_supply_that_sags_is_drafted_confirmed_and_named_on_another_rig() {
+    is_drafted_and_confirmed("supply-droop", 2.0, ["element", "own signal", "sum of signals"]);
+}
+
+#[test]
+fn what_the_motors_couple_in_is_drafted_confirmed_and_named_on_another_rig() {
+    is_drafted_and_confirmed("stage-pickup", 1.0, ["readout", "counts", "speed of travel"]);
 }
 
 /// Names of what is in a folder, in order.

@@ -93,6 +93,8 @@ struct Expected {
 
 /// Greatest number of proposals for one pair.
 const PROPOSALS_MAX: usize = 3;
+/// An experiment that shows a draft by so many standard errors shows it clearly.
+const CLEAR_Z: f64 = 20.0;
 /// Assumed size of an effect that was not shown, as a share of the experiment's largest signal.
 const SMALL_SHARE: f64 = 0.02;
 
@@ -145,7 +147,12 @@ impl Planner<'_> {
             let separates = [(*name).to_owned(), "noise".to_owned()];
             let is_any = |one: &Candidate| one.name != FLOOR;
             let expect = |design: &Design<'_>| self.beyond(design, with, without);
-            plan.take(rehearsals.answer(&separates, is_any, expect)?, separates, 1);
+            let mut answer = rehearsals.answer(&separates, is_any, expect)?;
+            // The shortest that shows it clearly: they are in order, the longest first.
+            let clear = |one: &NextExperiment| one.expected_z.is_some_and(|z| z >= CLEAR_Z);
+            let shortest = answer.next.iter().rposition(clear).unwrap_or(0);
+            answer.next = answer.next.into_iter().skip(shortest).collect();
+            plan.take(answer, separates, 1);
         }
         for NotShown { effect, .. } in open.not_shown {
             let separates = [(*effect).to_owned(), "nothing".to_owned()];

@@ -8,7 +8,7 @@ use super::discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
     Inclusion, Level, Split, Unexplained, Verdict,
 };
-use super::drafting::drafted;
+use super::drafting::{Drafting, drafted};
 use super::held_out::{HeldOutResidual, SEEN_NOISE};
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
@@ -146,11 +146,8 @@ pub(crate) fn conclude(
             .map_or(0.0, |(tolerance, noise)| tolerance / noise),
     };
     let verdict = evidence.verdict();
-    let is_open = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
-    let (draft, with_draft) = (is_open && options.rule == Rule::Protocol)
-        .then(|| drafted(prepared, search, &grown, &of_grown, floor.rms_counts().unwrap_or(0.0)))
-        .transpose()?
-        .map_or((None, None), |(draft, model)| (Some(draft), model));
+    let Drafting { draft, model: with_draft } =
+        drafted(prepared, search, verdict, (&grown, &of_grown), floor)?;
     let squares = |level: Level| level.heldout_rms_counts.powi(2);
     let noise_square = floor.rms_counts().unwrap_or(0.0).powi(2);
     let gap = squares(base_level) - noise_square;

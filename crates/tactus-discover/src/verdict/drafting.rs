@@ -3,12 +3,12 @@
 use tactus_model::Effect;
 use tactus_model::effect::{Definition, Draft};
 
-use super::discovery::BaseModel;
+use super::discovery::{BaseModel, Verdict};
 use super::held_out::HeldOutResidual;
-use crate::data::DiscoverError;
+use crate::data::{DiscoverError, Floor};
 use crate::fit::{Fitted, Prepared, Term};
 use crate::next::DraftModel;
-use crate::search::{Drafted, NoDraft, POLISH_ROUNDS, Search};
+use crate::search::{Drafted, NoDraft, POLISH_ROUNDS, Rule, Search};
 
 /// A draft that closes less of what was left on held-out presses is partial.
 const CLOSED_LEAST: f64 = 0.7;
@@ -51,21 +51,33 @@ impl DraftedEffect {
     }
 }
 
-/// Drafts what a grown model leaves.
+/// The draft of a discovery, or why there is none, and the model with it.
+#[derive(Debug, Default)]
+pub(super) struct Drafting {
+    pub(super) draft: Option<Result<Box<DraftedEffect>, NoDraft>>,
+    pub(super) model: Option<DraftModel>,
+}
+
+/// Drafts what a grown model leaves with this verdict, if that is anything.
 pub(super) fn drafted(
     prepared: &Prepared<'_>,
     search: &Search<'_>,
-    grown: &Fitted,
-    of_grown: &HeldOutResidual,
-    noise_counts: f64,
-) -> Result<(Result<Box<DraftedEffect>, NoDraft>, Option<DraftModel>), DiscoverError> {
+    verdict: Verdict,
+    (grown, of_grown): (&Fitted, &HeldOutResidual),
+    floor: Floor,
+) -> Result<Drafting, DiscoverError> {
+    let is_open = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
+    if !is_open || search.options.rule != Rule::Protocol {
+        return Ok(Drafting::default());
+    }
     let known = &prepared.known.effects;
     let of_model = known.iter().filter(|effect| effect.definition().draft().is_some()).count();
     let number = 1 + prepared.known.drafts.len() + of_model;
     let found = match search.draft(grown, number)? {
         Ok(found) => *found,
-        Err(none) => return Ok((Err(none), None)),
+        Err(none) => return Ok(Drafting { draft: Some(Err(none)), model: None }),
     };
+    let noise_counts = floor.rms_counts().unwrap_or(0.0);
     let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest, alike } = found;
     let after = prepared.held(&at.parameters)?;
     let [before, after] = [of_grown.rms_counts, after.rms_counts];
@@ -90,7 +102,7 @@ pub(super) fn drafted(
         base: super::conclude::base_of(prepared, &at.parameters),
         effects: at.parameters.effects()?,
     };
-    Ok((Ok(Box::new(found)), model))
+    Ok(Drafting { draft: Some(Ok(Box::new(found))), model })
 }
 
 /// What a new measurement says of a draft.
