@@ -10,6 +10,7 @@ mod campaign;
 mod constants;
 mod contests;
 mod document;
+mod drafts;
 mod forms;
 mod outcome;
 mod picture;

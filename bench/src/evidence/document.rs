@@ -8,6 +8,7 @@ use tactus_model::effect::REGISTRY;
 
 use super::ablation::Ablation;
 use super::campaign::Campaign;
+use super::drafts::{DraftScore, DraftScores};
 use super::outcome::Outcome;
 use super::rate::Rate;
 use super::score::{Band, OutsideScore, Scores, SetSize, Several, Shrink, Spread};
@@ -75,6 +76,7 @@ pub fn document(scores: &Scores, ablations: &[Ablation], costs: Option<&Costs>) 
         names(f, scores)?;
         several(f, scores)?;
         outside(f, scores)?;
+        drafts(f, &scores.drafts)?;
         methods(f, ablations)?;
         costs.map_or(Ok(()), |costs| time(f, costs))
     })
@@ -189,6 +191,17 @@ fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
         rows.push(rate("outside the library: not detected", 0.1, true, all.missed));
         rows.push(rate("outside the library: a wrong name", 0.05, true, all.wrong));
     }
+    if let Some(all) = scores.drafts.outside.get("all") {
+        rows.push(rate(
+            "outside the library: drafted with the right stage and covariate",
+            0.8,
+            false,
+            all.right,
+        ));
+        rows.push(rate("the same, and 70 % closed on held-out presses", 0.6, false, all.right_and_closed));
+    }
+    rows.push(rate("drafts of sets without hidden physics", 0.005, true, scores.drafts.of_nothing));
+    rows.push(rate("drafts of sets with one effect of the library", 0.05, true, scores.drafts.of_named));
     writeln!(f, "## Targets\n")?;
     writeln!(f, "| what | target | measured | 95 % interval | sets | result |\n|---|---|---|---|---|---|")?;
     for Target { what, wanted, is_most, seen, of, interval } in rows {
@@ -343,6 +356,28 @@ fn outside(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
             percent(wrong.share),
             percent(partly.share),
             percent(missed.share)
+        )?;
+    }
+    Ok(())
+}
+
+/// Drafts, by what is hidden.
+fn drafts(f: &mut fmt::Formatter<'_>, scores: &DraftScores) -> fmt::Result {
+    writeln!(
+        f,
+        "\n## Drafts\n\nA draft is right if its stage and its first covariate are those of the hidden physics. All sets are in the denominators, \
+         those included in which an effect was named or nothing was seen. Physics that is drawn anew for each reading has no mean to draft; it is \
+         drafted in {} of {} sets.\n\n| physics | sets | drafted | right stage and covariate | right, and 70 % closed |\n|---|---|---|---|---|",
+        scores.of_single.hits, scores.of_single.of
+    )?;
+    for (physics, DraftScore { drafted, right, right_and_closed }) in &scores.outside {
+        writeln!(
+            f,
+            "| {physics} | {} | {} | {} | {} |",
+            drafted.of,
+            percent(drafted.share),
+            percent(right.share),
+            percent(right_and_closed.share)
         )?;
     }
     Ok(())

@@ -7,6 +7,7 @@ use serde::{Deserialize, de::DeserializeOwned};
 use tactus_sets::Label;
 
 use super::campaign::{Campaign, Planned};
+use super::drafts::Draft;
 use super::run::{Places, Ran};
 use super::score::SHRINK_ERROR_MAX;
 
@@ -35,6 +36,8 @@ pub struct Outcome {
     pub gap_error: f64,
     /// Shrink of the first hidden effect, fitted alone in the first round; `None` if it was not fitted.
     pub alone_shrink: Option<f64>,
+    /// The draft of what is left, if there is one.
+    pub draft: Option<Draft>,
     /// Time of the processor in s, on one thread.
     pub seconds: f64,
     /// Greatest resident memory in MiB.
@@ -161,6 +164,19 @@ struct DiscoveryReport {
     #[serde(rename = "final")]
     last: Last,
     verdict: String,
+    #[serde(default)]
+    draft: Option<Drafted>,
+}
+
+/// A draft, or why there is none.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Drafted {
+    Found(Draft),
+    None {
+        #[expect(dead_code, reason = "only tells the two apart")]
+        none_because: String,
+    },
 }
 
 #[derive(Debug, Deserialize)]
@@ -243,6 +259,10 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryRepo
             .flat_map(|report| &report.rounds)
             .filter_map(|round| round.taken.clone())
             .collect(),
+        draft: report.as_ref().and_then(|report| match &report.draft {
+            Some(Drafted::Found(draft)) => Some(draft.clone()),
+            Some(Drafted::None { .. }) | None => None,
+        }),
         seconds: ran.processor_s,
         peak_mib: ran.peak_mib,
         verdict: report.as_ref().map_or_else(|| "failed".into(), |report| report.verdict.clone()),

@@ -33,6 +33,7 @@ pub(crate) fn set(truths: &[Option<&str>], names: &[(&str, &[&str])], verdict: &
         deeper_shrink: None,
         gap_error: 0.01,
         alone_shrink: None,
+        draft: None,
         seconds: 1.0,
         peak_mib: 100.0,
     }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::campaign::Campaign;
+use super::drafts::DraftScores;
 use super::outcome::Outcome;
 use super::rate::{Rate, normal_share, quantile};
 
@@ -61,6 +62,8 @@ pub struct Scores {
     pub separate_triples: Several,
     /// Sets outside the library: `all` and by physics.
     pub outside: BTreeMap<String, OutsideScore>,
+    /// Drafts of what no class explains.
+    pub drafts: DraftScores,
     /// Seconds of a set on one thread.
     pub seconds: Option<Spread>,
     /// Greatest resident memory of a set, in MiB.
@@ -226,6 +229,7 @@ impl Scores {
             separate_pairs: Several::new(&within(&pairs, BANDS[3].1)),
             separate_triples: Several::new(&within(&triples, BANDS[3].1)),
             outside: by_physics(&outside),
+            drafts: DraftScores::new(&false_alarms, &names, &outside),
             seconds: Spread::new(outcomes.iter().map(|outcome| outcome.seconds)),
             peak_mib: Spread::new(outcomes.iter().map(|outcome| outcome.peak_mib)),
         }

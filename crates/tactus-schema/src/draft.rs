@@ -194,7 +194,7 @@ impl DraftFile {
         let raw: RawFile = toml::from_str(text)?;
         check_schema(SCHEMA, &raw.schema)?;
         let draft = raw.effect.check("effect")?;
-        draft.clone().define()?;
+        draft.check()?;
         Ok(Self {
             draft,
             status: raw.status,

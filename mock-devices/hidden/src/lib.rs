@@ -21,11 +21,13 @@
 //! ```
 
 mod climate;
+mod drafts;
 mod physics;
 mod random_rig;
 mod sensor;
 
 pub use climate::Climate;
+pub use drafts::{DraftTruth, SINGLE};
 pub use physics::{CATALOGUE, Definition, Dose, STRENGTH_MAX};
 pub use random_rig::RandomRig;
 pub use sensor::HiddenSensor;

@@ -320,7 +320,7 @@ impl Draft {
     /// # Errors
     /// [`EffectError::Draft`] says what is wrong with it.
     pub fn define(self) -> Result<&'static Definition, EffectError> {
-        self.check().map_err(|want| EffectError::Draft { name: self.name.clone(), want })?;
+        self.check()?;
         let mut defined = DEFINED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some((_, known)) = defined.iter().find(|(draft, _)| **draft == self) {
             return Ok(known);
@@ -339,8 +339,16 @@ impl Draft {
         Ok(definition)
     }
 
+    /// Checks that it is an effect.
+    ///
+    /// # Errors
+    /// [`EffectError::Draft`] says what is wrong with it.
+    pub fn check(&self) -> Result<(), EffectError> {
+        self.checked().map_err(|want| EffectError::Draft { name: self.name.clone(), want })
+    }
+
     /// What must be otherwise.
-    fn check(&self) -> Result<(), String> {
+    fn checked(&self) -> Result<(), String> {
         let is_name = |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '-';
         if self.name.is_empty() || !self.name.chars().all(is_name) {
             return Err("its name must have small letters, digits and hyphens only".into());
