@@ -2,8 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tactus_schema::{DraftFile, Rig};
 use tactus_schema::model::Model;
+use tactus_schema::{DraftFile, Rig};
 use tactus_wire::declared::RawFormat;
 
 fuzz_target!(|text: &str| {
