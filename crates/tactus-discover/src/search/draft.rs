@@ -281,11 +281,11 @@ impl Search<'_> {
         let curve = self.curve(at, sight, &atom)?;
         let reduced = curves::reduced(&atom, &curve, excused(0.5 * curve.squares()));
         let draft = words::named(sight, &atom, reduced.law, number);
-        Ok(self.taken(at, draft)?.map(|(draft, fitted)| Drafted {
+        Ok(self.taken(at, draft)?.map(|(draft, fitted, by)| Drafted {
             draft,
             at: fitted,
-            covariance: reduced.covariance,
-            knots: reduced.knots,
+            covariance: scaled(reduced.covariance, by * by),
+            knots: reduced.knots.into_iter().map(|[at, value, error]| [at, by * value, by * error]).collect(),
             p_value: 1.0,
             ln_odds: 0.0,
             folds: 0,
@@ -354,22 +354,23 @@ impl Search<'_> {
     }
 
     /// The draft as a term of the model, with its law scaled so that its strength is 1; `None` if it does not come nearer to the data.
-    fn taken(&self, at: &Fitted, draft: Draft) -> Result<Option<(Draft, Fitted)>, DiscoverError> {
+    fn taken(&self, at: &Fitted, draft: Draft) -> Result<Option<(Draft, Fitted, f64)>, DiscoverError> {
         let term = Term { values: vec![1.0], ..Term::neutral(draft.clone().define()?) };
         let fitted = self.problem.fit_from(at.parameters.with(term), POLISH_ROUNDS)?;
         let strength = fitted.parameters.terms.last().map_or(0.0, |term| term.values[0]);
         if strength <= 0.0 || fitted.cost >= at.cost {
             return Ok(None);
         }
-        let scaled = Draft { law: curves::scaled(&draft.law, strength), ..draft };
+        let draft = Draft { law: curves::scaled(&draft.law, strength), ..draft };
+        let draft = Draft { sentence: words::sentence(&draft), ..draft };
         // The prediction is the same: a draft is its strength times its law.
         let mut parameters = fitted.parameters;
         if let Some(last) = parameters.terms.last_mut() {
-            *last = Term { values: vec![1.0], ..Term::neutral(scaled.clone().define()?) };
+            *last = Term { values: vec![1.0], ..Term::neutral(draft.clone().define()?) };
         }
         let mut errors = fitted.errors;
         errors.last_mut().into_iter().flatten().for_each(|error| *error /= strength);
-        Ok(Some((scaled, Fitted { parameters, errors, ..fitted })))
+        Ok(Some((draft, Fitted { parameters, errors, ..fitted }, strength)))
     }
 
     /// How much of a draft, the last term of a model, is not taken up by recalibration and the other terms.
@@ -380,6 +381,11 @@ impl Search<'_> {
         let grams = self.problem.grams(at, vec![direction])?;
         Ok(grams.size(0) / grams.whole(0).max(f64::MIN_POSITIVE))
     }
+}
+
+/// Rows times a factor.
+fn scaled(rows: Vec<Vec<f64>>, by: f64) -> Vec<Vec<f64>> {
+    rows.into_iter().map(|row| row.into_iter().map(|value| by * value).collect()).collect()
 }
 
 /// The atoms as additions, each a class of its own.
