@@ -9,6 +9,7 @@ mod design;
 mod devices;
 mod discover;
 mod disk;
+mod effects;
 mod embedded;
 mod kill_trials;
 mod link;

@@ -85,6 +85,8 @@ enum CliCommand {
     Calibrate(CalibrateArgs),
     /// Find which effects the model is missing, fit them and report how much better it predicts; from recordings or tables.
     Discover(DiscoverArgs),
+    /// List the effects of the library and the drafts of a folder; show, rename and retire drafts.
+    Effects(EffectsArgs),
     /// Repeat the paper on one rig: runs, calibration, mechanics, acuity and images in one report.
     Study(StudyArgs),
     /// Simulate what a sensor reads from a tool: one image, frames along a path, or live frames on the bus.
@@ -109,6 +111,39 @@ enum CliCommand {
     Completions {
         /// Shell to complete for.
         shell: Shell,
+    },
+}
+
+/// The lab's own library of effects, and what to do with it.
+#[derive(Debug, Args)]
+pub(crate) struct EffectsArgs {
+    /// Folder of drafts (.toml).
+    #[arg(long, global = true, value_name = "DIR")]
+    pub(crate) library: Option<PathBuf>,
+    #[command(subcommand)]
+    pub(crate) command: Option<EffectsCommand>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum EffectsCommand {
+    /// List all effects; the default.
+    List,
+    /// Show an effect: what it does, on what it depends, where it was seen.
+    Show {
+        /// Its name.
+        name: String,
+    },
+    /// Give a draft a name, and its file too.
+    Rename {
+        /// Its name.
+        name: String,
+        /// The new name: small letters, digits and hyphens.
+        to: String,
+    },
+    /// Withdraw a draft: its file stays, and no discovery tries it.
+    Retire {
+        /// Its name.
+        name: String,
     },
 }
 
@@ -584,6 +619,7 @@ fn dispatch(common: &Common, command: CliCommand) -> anyhow::Result<Exit> {
         CliCommand::Discover(args) => commands::discover::discover(common, &args),
         CliCommand::Study(args) => commands::study::study(common, &args),
         CliCommand::Simulate(args) => commands::simulate::simulate(common, &args),
+        CliCommand::Effects(args) => commands::effects::effects(common, &args),
         CliCommand::Design(args) => commands::design::design(common, &args),
         CliCommand::Figures(args) => commands::figures::figures(common, &args),
         CliCommand::Devices(args) => commands::devices::devices(common, &args),

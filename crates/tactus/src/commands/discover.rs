@@ -1,7 +1,6 @@
 //! `discover`: finds what a model is missing; writes a report, its numbers, the grown model and the residuals.
 
 mod active;
-mod library;
 mod measurements;
 mod model;
 mod print;
@@ -25,6 +24,7 @@ use tactus_schema::draft::{DraftEvidence, DraftFile, DraftStatus, Nearest};
 use tactus_schema::{Model, Rig};
 
 use crate::cli::{Ablation, Common, DiscoverArgs};
+use crate::commands::library;
 use crate::exit::{Exit, Failure};
 use crate::output;
 use crate::progress::ComputationProgress;
@@ -67,7 +67,7 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     let progress = ComputationProgress::new(common.json);
     let declared = args.model.as_deref().map(declared).transpose()?;
     let folder = UnfinishedFolder::create(&args.out)?;
-    let library = args.library.as_deref().map(library::read).transpose()?.unwrap_or_default();
+    let library = args.library.as_deref().map(library::in_use).transpose()?.unwrap_or_default();
     let analyse = |files: &[PathBuf], live: Option<&LiveRig>, drafts: &[&'static Definition]| {
         let drafts = [&library, drafts].concat();
         analysed(args, declared.clone(), files, live, &drafts, &progress)

@@ -9,7 +9,7 @@ use tactus_record::Completeness;
 use tactus_runner::config::{self, ServiceConfig};
 use tactus_runner::embedded::{HIDDEN_SCHEMA, SIMULATED_RIG, TruthFile};
 use tactus_runner::experiments;
-use tactus_schema::{Model, Rig, model, rig};
+use tactus_schema::{DraftFile, Model, Rig, draft, model, rig};
 use tactus_wire::declared;
 
 use super::link;
@@ -75,15 +75,20 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
             let (name, rows, cols) = (base.array.name(), base.array.rows(), base.array.cols());
             Ok(format!("model of {name:?}, {rows} x {cols} elements, {} effects", effects.len()))
         }
+        Some(draft::SCHEMA) => {
+            let DraftFile { draft, status, .. } = DraftFile::from_toml(&text)?;
+            Ok(format!("draft {:?}, {}", draft.name, status.name()))
+        }
         Some(HIDDEN_SCHEMA) => {
             TruthFile::from_toml(&text)?;
             Ok("hidden physics for a simulated rig".into())
         }
         Some(declared::SCHEMA) => Ok(link::in_words(&link::described(&text)?)),
         Some(other) => bail!(
-            "schema {other:?} is unknown; known are {}, {}, {}, {HIDDEN_SCHEMA}",
+            "schema {other:?} is unknown; known are {}, {}, {}, {}, {HIDDEN_SCHEMA}",
             rig::SCHEMA,
             model::SCHEMA,
+            draft::SCHEMA,
             declared::SCHEMA
         ),
         None => {
