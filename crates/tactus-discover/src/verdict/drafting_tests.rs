@@ -4,18 +4,22 @@ use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, PipelineStage, When};
 
 use crate::fixtures::{ELEMENTS, found, known, measured, processes};
-use crate::{Discovery, DraftedEffect, Frames, Known, NoDraft, Verdict};
+use crate::{Discovery, DraftedEffect, Frames, Known, NoDraft, Verdict, confirm};
 
 /// Independent noise of one count, nearly white.
-fn noise() -> Vec<Vec<f64>> {
-    processes(ELEMENTS, 1.0, 0.03, &mut ChaCha8Rng::seed_from_u64(11))
+fn noise(seed: u64) -> Vec<Vec<f64>> {
+    processes(ELEMENTS, 1.0, 0.03, &mut ChaCha8Rng::seed_from_u64(seed))
 }
 
 /// Frames in which `more` is added to the counts of the base model, from the rises of all elements, the depth and the element.
 fn with(more: impl Fn(&[f64], f64, usize) -> f64) -> (Known, Frames) {
+    with_noise(11, more)
+}
+
+fn with_noise(seed: u64, more: impl Fn(&[f64], f64, usize) -> f64) -> (Known, Frames) {
     let known = known();
     let clean = measured(&known, &[], &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
-    let mut upon = noise();
+    let mut upon = noise(seed);
     for (frame, upon) in upon.iter_mut().enumerate() {
         let rises: Vec<f64> =
             clean.counts_of(frame).iter().map(|counts| f64::from(*counts) - 100.0).collect();
@@ -99,4 +103,18 @@ fn a_draft_in_the_library_is_found_by_its_name_and_leaves_nothing_to_draft() {
     let names: Vec<&str> = second.steps.iter().map(|step| step.effect).collect();
     assert_eq!(names, ["draft-1"]);
     assert!(second.draft.is_none() || second.draft == Some(Err(NoDraft::Noise)), "{:?}", second.draft);
+}
+
+#[test]
+fn new_data_confirm_a_draft_that_holds_and_refute_one_that_does_not() {
+    let sags = |rises: &[f64], _: f64, element: usize| rises[element] * droop(rises.iter().sum());
+    let (known, frames) = with(sags);
+    let definition = drafted(&found(&known, &frames)).draft.clone().define().unwrap();
+    let of = |frames: &Frames| confirm(&known, frames, definition, 1).unwrap();
+    let again = of(&with_noise(12, sags).1);
+    assert!(again.holds() && (again.strength - 1.0).abs() < 0.1, "{again:?}");
+    let half = of(&with_noise(12, |rises, depth, element| 0.5 * sags(rises, depth, element)).1);
+    assert!(!half.holds() && (half.strength - 0.5).abs() < 0.1, "it is there, but not as strong: {half:?}");
+    let none = of(&with_noise(12, |_, _, _| 0.0).1);
+    assert!(!none.holds() && none.strength.abs() < 0.1, "{none:?}");
 }
