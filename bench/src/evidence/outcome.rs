@@ -7,7 +7,7 @@ use serde::{Deserialize, de::DeserializeOwned};
 use tactus_sets::Label;
 
 use super::campaign::{Campaign, Planned};
-use super::drafts::Draft;
+use super::drafts::{Covariate, Draft};
 use super::run::{Places, Ran};
 use super::score::SHRINK_ERROR_MAX;
 
@@ -168,15 +168,13 @@ struct DiscoveryReport {
     draft: Option<Drafted>,
 }
 
-/// A draft, or why there is none.
+/// A draft; without a stage the report says why there is none.
 #[derive(Debug, Deserialize)]
-#[serde(untagged)]
-enum Drafted {
-    Found(Draft),
-    None {
-        #[expect(dead_code, reason = "only tells the two apart")]
-        none_because: String,
-    },
+struct Drafted {
+    stage: Option<String>,
+    #[serde(default)]
+    covariates: Vec<Covariate>,
+    closed_share: Option<f64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -259,9 +257,10 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryRepo
             .flat_map(|report| &report.rounds)
             .filter_map(|round| round.taken.clone())
             .collect(),
-        draft: report.as_ref().and_then(|report| match &report.draft {
-            Some(Drafted::Found(draft)) => Some(draft.clone()),
-            Some(Drafted::None { .. }) | None => None,
+        draft: report.as_ref().and_then(|report| {
+            let Drafted { stage, covariates, closed_share } = report.draft.as_ref()?;
+            let (covariates, closed_share) = (covariates.clone(), *closed_share);
+            Some(Draft { stage: stage.clone()?, covariates, closed_share })
         }),
         seconds: ran.processor_s,
         peak_mib: ran.peak_mib,
