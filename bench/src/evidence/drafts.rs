@@ -7,6 +7,7 @@ use tactus_hidden::DraftTruth;
 
 use super::outcome::Outcome;
 use super::rate::Rate;
+use super::score::by_physics;
 
 /// A draft closes a set if it closes this share of what was left on held-out presses.
 const CLOSED_LEAST: f64 = 0.7;
@@ -89,13 +90,7 @@ impl DraftScores {
             |set: &&&Outcome| set.truths.iter().any(|truth| DraftTruth::find(&truth.physics).is_some());
         let (mean, single): (Vec<&Outcome>, Vec<&Outcome>) =
             outside.iter().copied().partition(|set| has_mean(&set));
-        let mut groups: BTreeMap<String, Vec<&Outcome>> = BTreeMap::new();
-        for set in &mean {
-            let physics = set.truths.iter().map(|truth| truth.physics.as_str());
-            for group in ["all"].into_iter().chain(physics) {
-                groups.entry(group.into()).or_default().push(set);
-            }
-        }
+        let groups = by_physics(&mean);
         let drafted = |sets: &[&Outcome]| Rate::of(sets, |set| set.draft.is_some());
         Self {
             outside: groups.into_iter().map(|(group, sets)| (group, DraftScore::of(&sets))).collect(),

@@ -228,7 +228,10 @@ impl Scores {
             triples: Several::new(&triples),
             separate_pairs: Several::new(&within(&pairs, BANDS[3].1)),
             separate_triples: Several::new(&within(&triples, BANDS[3].1)),
-            outside: by_physics(&outside),
+            outside: by_physics(&outside)
+                .into_iter()
+                .map(|(physics, sets)| (physics, OutsideScore::new(&sets)))
+                .collect(),
             drafts: DraftScores::new(&false_alarms, &names, &outside),
             seconds: Spread::new(outcomes.iter().map(|outcome| outcome.seconds)),
             peak_mib: Spread::new(outcomes.iter().map(|outcome| outcome.peak_mib)),
@@ -359,7 +362,8 @@ fn by_noise(sets: &[&Outcome]) -> BTreeMap<String, Rate> {
     groups.into_iter().map(|(kind, sets)| (kind, Rate::of(&sets, is_alarm))).collect()
 }
 
-fn by_physics(sets: &[&Outcome]) -> BTreeMap<String, OutsideScore> {
+/// Some sets as `all`, and by physics.
+pub(super) fn by_physics<'a>(sets: &[&'a Outcome]) -> BTreeMap<String, Vec<&'a Outcome>> {
     let mut groups: BTreeMap<String, Vec<&Outcome>> = BTreeMap::new();
     for set in sets {
         let physics = set.truths.iter().map(|truth| truth.physics.as_str());
@@ -367,7 +371,7 @@ fn by_physics(sets: &[&Outcome]) -> BTreeMap<String, OutsideScore> {
             groups.entry(group.into()).or_default().push(set);
         }
     }
-    groups.into_iter().map(|(physics, sets)| (physics, OutsideScore::new(&sets))).collect()
+    groups
 }
 
 /// One point for each power of two of the separation.

@@ -98,8 +98,7 @@ impl Contact {
     /// The depth from which the whole of a flat face touches that leans; `None` for other tools. From there on the penetration grows
     /// evenly with depth.
     pub(crate) fn whole_from_mm(&self, lean: [f64; 2]) -> Option<f64> {
-        let is_flat = matches!(self.indenter, Indenter::Cylinder { .. } | Indenter::Box { .. });
-        is_flat.then(|| 2.0 * self.indenter.lowered_mm(lean))
+        self.indenter.is_flat().then(|| 2.0 * self.indenter.lowered_mm(lean))
     }
 
     fn cut(&self, cut: Cut, sigma_mm: f64) -> Vec<Slice> {

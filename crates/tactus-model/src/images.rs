@@ -87,8 +87,7 @@ impl Images {
 /// True if the penetration is uniform over the tool's face. The image is then proportional to it, up to the covering's
 /// thickness.
 fn is_even(press: &Load) -> bool {
-    let is_flat = matches!(press.contact.indenter, Indenter::Cylinder { .. } | Indenter::Box { .. });
-    is_flat && press.lean.iter().all(|by| *by == 0.0)
+    press.contact.indenter.is_flat() && press.lean.iter().all(|by| *by == 0.0)
 }
 
 fn key(base: BaseModel<'_>, press: &Load) -> Option<Key> {

@@ -34,6 +34,11 @@ pub enum Indenter {
 }
 
 impl Indenter {
+    /// True if it is flat below: upright it presses its whole face equally deep.
+    pub(crate) fn is_flat(&self) -> bool {
+        matches!(self, Self::Cylinder { .. } | Self::Box { .. })
+    }
+
     /// By how much the lowest point of the tool stands deeper than the foot of its axis when it leans about it: when
     /// its face stands deeper by `lean` per mm along its own x and y. Round heads roll, and stay as deep.
     pub(crate) fn lowered_mm(&self, [by_x, by_y]: [f64; 2]) -> f64 {

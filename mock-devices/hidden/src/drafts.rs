@@ -17,7 +17,7 @@ const OF_SIGNAL: &[&str] = &["covering", "element"];
 const IN_COVERING: &[&str] = &["covering"];
 const IN_READOUT: &[&str] = &["readout"];
 
-/// By the physics' id; those of [`SINGLE`] have none.
+/// By the physics' id; what is drawn anew for each reading has no mean, so nothing is to be drafted of it.
 const TRUTHS: [(&str, DraftTruth); 20] = [
     ("supply-droop", truth(OF_SIGNAL, &["sum of signals"])),
     ("dragged-spread", truth(IN_COVERING, &["distance along the approach"])),
@@ -41,9 +41,6 @@ const TRUTHS: [(&str, DraftTruth); 20] = [
     ("range-switch", truth(IN_READOUT, &["counts"])),
 ];
 
-/// Physics that is drawn anew for each reading: it has no mean, so nothing is to be drafted of it.
-pub const SINGLE: [&str; 4] = ["gain-flicker", "row-bursts", "frame-tearing", "bit-flips"];
-
 const fn truth(stages: &'static [&'static str], covariates: &'static [&'static str]) -> DraftTruth {
     DraftTruth { stages, covariates }
 }
@@ -59,8 +56,11 @@ impl DraftTruth {
 mod tests {
     use std::collections::BTreeSet;
 
-    use super::{SINGLE, TRUTHS};
+    use super::TRUTHS;
     use crate::CATALOGUE;
+
+    /// Drawn anew for each reading.
+    const SINGLE: [&str; 4] = ["gain-flicker", "row-bursts", "frame-tearing", "bit-flips"];
 
     #[test]
     fn each_physics_outside_the_library_has_one_or_none_on_purpose() {

@@ -27,7 +27,7 @@ mod random_rig;
 mod sensor;
 
 pub use climate::Climate;
-pub use drafts::{DraftTruth, SINGLE};
+pub use drafts::DraftTruth;
 pub use physics::{CATALOGUE, Definition, Dose, STRENGTH_MAX};
 pub use random_rig::RandomRig;
 pub use sensor::HiddenSensor;

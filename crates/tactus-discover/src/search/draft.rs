@@ -102,6 +102,14 @@ impl NoDraft {
 /// The outcome of drafting.
 pub(crate) type Outcome = Result<Box<Drafted>, NoDraft>;
 
+/// A draft as an effect, fitted.
+struct AsEffect {
+    draft: Draft,
+    at: Fitted,
+    covariance: Vec<Vec<f64>>,
+    knots: Vec<[f64; 3]>,
+}
+
 /// An atom with its columns in a pass.
 struct Weighed {
     atom: Atom,
@@ -139,18 +147,29 @@ impl Search<'_> {
             return Ok(Err(NoDraft::Class(class)));
         }
         let best = self.with_second(at, &sight, &weighed[best].atom, ln_odds, count)?;
-        let Some(mut drafted) = self.fitted_draft(at, &sight, best, number)? else {
+        let Some(AsEffect { draft, at: with, covariance, knots }) =
+            self.as_effect(at, &sight, best, number)?
+        else {
             return Ok(Err(NoDraft::NoGain));
         };
-        if self.own_share(at, &drafted.at)? < OWN_LEAST {
+        if self.own_share(at, &with)? < OWN_LEAST {
             return Ok(Err(NoDraft::TakenUp));
         }
-        drafted.ln_odds = self.ln_odds(at, &drafted.at);
-        if drafted.ln_odds < AHEAD_LN_ODDS {
+        let ln_odds = self.ln_odds(at, &with);
+        if ln_odds < AHEAD_LN_ODDS {
             return Ok(Err(NoDraft::NoGain));
         }
-        (drafted.p_value, drafted.folds, drafted.nearest, drafted.alike) = (p_value, folds, nearest, alike);
-        Ok(Ok(Box::new(drafted)))
+        Ok(Ok(Box::new(Drafted {
+            draft,
+            at: with,
+            covariance,
+            knots,
+            p_value,
+            ln_odds,
+            folds,
+            nearest,
+            alike,
+        })))
     }
 
     /// Probability that noise gives as much to any atom, and the atoms that come first.
@@ -269,28 +288,26 @@ impl Search<'_> {
     }
 
     /// The atom's curve, as a law or a table, fitted as an effect; `None` if it gains nothing.
-    fn fitted_draft(
+    fn as_effect(
         &self,
         at: &Fitted,
         sight: &Arc<Sight>,
         atom: Atom,
         number: usize,
-    ) -> Result<Option<Drafted>, DiscoverError> {
-        let atom = if atom.of_elements { self.with_weights(at, sight, atom)? } else { atom };
-        let atom = self.with_weights_beside(at, sight, atom)?;
-        let curve = self.curve(at, sight, &atom)?;
+    ) -> Result<Option<AsEffect>, DiscoverError> {
+        let mut atom = if atom.of_elements { self.with_weights(at, sight, atom)? } else { atom };
+        let mut curve = self.curve(at, sight, &atom)?;
+        if let Some(weights) = self.weights_beside(at, sight, &atom, &curve)? {
+            atom = Atom { weights: Some(weights), ..atom };
+            curve = self.curve(at, sight, &atom)?;
+        }
         let reduced = curves::reduced(&atom, &curve, excused(0.5 * curve.squares()));
         let draft = words::named(sight, &atom, reduced.law, number);
-        Ok(self.taken(at, draft)?.map(|(draft, fitted, by)| Drafted {
+        Ok(self.taken(at, draft)?.map(|(draft, fitted, by)| AsEffect {
             draft,
             at: fitted,
             covariance: scaled(reduced.covariance, by * by),
             knots: reduced.knots.into_iter().map(|[at, value, error]| [at, by * value, by * error]).collect(),
-            p_value: 1.0,
-            ln_odds: 0.0,
-            folds: 0,
-            nearest: Vec::new(),
-            alike: Vec::new(),
         }))
     }
 
@@ -317,30 +334,29 @@ impl Search<'_> {
         Ok(Atom { weights: Some(weights), of_elements: false, curve: None, ..atom })
     }
 
-    /// An atom that acts on all elements alike, with a weight for each if what differs between them gains more than a form is excused for.
-    fn with_weights_beside(
+    /// Weights of the elements for an atom that acts on all alike along this curve, if what differs between them gains more than a form is
+    /// excused for.
+    fn weights_beside(
         &self,
         at: &Fitted,
         sight: &Arc<Sight>,
-        atom: Atom,
-    ) -> Result<Atom, DiscoverError> {
+        atom: &Atom,
+        curve: &curves::Curve,
+    ) -> Result<Option<Arc<Vec<f64>>>, DiscoverError> {
         let may_have = matches!(atom.carrier, Carrier::Counts | Carrier::OwnSignal | Carrier::EveryElement);
-        if atom.weights.is_some() || atom.per_unit.is_some() || atom.covariates.len() > 1 || !may_have {
-            return Ok(atom);
+        let most = curve.values.amax();
+        let is_plain = atom.weights.is_none() && atom.per_unit.is_none() && atom.covariates.len() == 1;
+        if !(may_have && is_plain && most > 0.0) {
+            return Ok(None);
         }
-        let curve = self.curve(at, sight, &atom)?.values;
-        let most = curve.amax();
-        if most == 0.0 {
-            return Ok(atom);
-        }
-        let shared = Arc::new(curve.iter().map(|value| value / most).collect());
+        let shared = Arc::new(curve.values.iter().map(|value| value / most).collect());
         let beside = Atom { of_elements: true, curve: Some(shared), ..atom.clone() };
         let (weighed, grams) = self.products(at, sight, vec![atom.clone(), beside])?;
         let additions = additions(&weighed, &grams, 1.0);
         let evidence = self.evidence_of(&additions, grams.reduced());
         let common = evidence.set([0]);
         if evidence.gain(&common, 1).ln_odds <= excused(common.ln_odds) {
-            return Ok(atom);
+            return Ok(None);
         }
         let found: BTreeMap<usize, f64> = evidence.coefficients(&evidence.set([0, 1])).into_iter().collect();
         let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
@@ -350,7 +366,7 @@ impl Search<'_> {
             .map(value)
             .fold(f64::MIN_POSITIVE, |most: f64, one| most.max(one.abs()));
         let weights = weighed[1].directions.iter().map(|one| 1.0 + value(one) / most).collect();
-        Ok(Atom { weights: Some(Arc::new(weights)), ..atom })
+        Ok(Some(Arc::new(weights)))
     }
 
     /// The draft as a term of the model, with its law scaled so that its strength is 1; `None` if it does not come nearer to the data.

@@ -9,7 +9,7 @@ use super::discovery::{
     Inclusion, Level, Split, Unexplained, Verdict,
 };
 use super::drafting::{Drafting, drafted};
-use super::held_out::{HeldOutResidual, SEEN_NOISE};
+use super::held_out::{HeldOutResidual, SEEN_NOISE, closed_share};
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
@@ -148,10 +148,8 @@ pub(crate) fn conclude(
     let verdict = evidence.verdict();
     let Drafting { draft, model: with_draft } =
         drafted(prepared, search, verdict, (&grown, &of_grown), floor)?;
-    let squares = |level: Level| level.heldout_rms_counts.powi(2);
-    let noise_square = floor.rms_counts().unwrap_or(0.0).powi(2);
-    let gap = squares(base_level) - noise_square;
-    let closed = squares(base_level) - squares(grown_level);
+    let noise_counts = floor.rms_counts().unwrap_or(0.0);
+    let levels = [base_level, grown_level].map(|level| level.heldout_rms_counts);
 
     let mut not_shown = lacking;
     not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.reach)));
@@ -187,8 +185,7 @@ pub(crate) fn conclude(
         tentative,
         final_: Final {
             level: grown_level,
-            // By chance the remainder may be smaller than the noise.
-            shrink: (p_value <= ALPHA && gap > 0.0).then(|| (closed / gap).min(1.0)),
+            shrink: closed_share(levels, noise_counts).filter(|_| p_value <= ALPHA),
         },
         verdict,
         draft,

@@ -4,7 +4,7 @@ use tactus_model::Effect;
 use tactus_model::effect::{Definition, Draft};
 
 use super::discovery::{BaseModel, Verdict};
-use super::held_out::HeldOutResidual;
+use super::held_out::{HeldOutResidual, closed_share};
 use crate::data::{DiscoverError, Floor};
 use crate::fit::{Fitted, Prepared, Term};
 use crate::next::DraftModel;
@@ -81,7 +81,6 @@ pub(super) fn drafted(
     let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest, alike } = found;
     let after = prepared.held(&at.parameters)?;
     let [before, after] = [of_grown.rms_counts, after.rms_counts];
-    let left = before * before - noise_counts * noise_counts;
     let model = at.parameters.terms.last().map(|term| DraftModel {
         name: term.definition.name,
         with: at.parameters.clone(),
@@ -96,7 +95,7 @@ pub(super) fn drafted(
         folds,
         nearest,
         alike,
-        closed_share: (left > 0.0).then(|| ((before * before - after * after) / left).min(1.0)),
+        closed_share: closed_share([before, after], noise_counts),
         heldout_rms_before_counts: before,
         heldout_rms_after_counts: after,
         base: super::conclude::base_of(prepared, &at.parameters),
@@ -147,13 +146,12 @@ pub(crate) fn confirmation(
     let (before, after) = (prepared.held(base)?, prepared.held(&fitted.parameters)?);
     let noise_counts = prepared.floor_of(&after).rms_counts().unwrap_or(0.0);
     let [before, after] = [before.rms_counts, after.rms_counts];
-    let left = before * before - noise_counts * noise_counts;
     let last = fitted.parameters.terms.last().zip(fitted.errors.last());
     let (strength, error) = last.map_or((0.0, f64::NAN), |(term, errors)| (term.values[0], errors[0]));
     Ok(Confirmation {
         strength,
         strength_se: Some(error).filter(|error| error.is_finite()),
-        closed_share: (left > 0.0).then(|| ((before * before - after * after) / left).min(1.0)),
+        closed_share: closed_share([before, after], noise_counts),
         heldout_rms_before_counts: before,
         heldout_rms_after_counts: after,
     })

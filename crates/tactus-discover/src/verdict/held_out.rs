@@ -22,6 +22,13 @@ pub(super) struct HeldOutResidual {
     pub(super) signal: Vec<f32>,
 }
 
+/// Share of a residual beyond noise that is closed, in mean squares: from one root mean square to another. `None` where there is nothing
+/// beyond noise; by chance what remains may be smaller than the noise.
+pub(super) fn closed_share([before, after]: [f64; 2], noise: f64) -> Option<f64> {
+    let gap = before * before - noise * noise;
+    (gap > 0.0).then(|| ((before * before - after * after) / gap).min(1.0))
+}
+
 impl HeldOutResidual {
     /// The residual of each element, and that of a grown model.
     pub(super) fn elements_beside(&self, grown: &Self) -> Vec<ElementGap> {

@@ -134,7 +134,7 @@ impl Mixing {
 }
 
 /// From which others an element takes a share.
-enum Reach {
+pub(super) enum Reach {
     /// Those at offsets in rows and columns, with a weight.
     Near(&'static [([isize; 2], f64)]),
     /// The others of its row.
@@ -143,9 +143,13 @@ enum Reach {
     Column,
 }
 
+/// The up to four nearest.
+pub(super) const NEAREST: Reach =
+    Reach::Near(&[([0, -1], 1.0), ([0, 1], 1.0), ([-1, 0], 1.0), ([1, 0], 1.0)]);
+
 /// In the order of the effect's shares.
 const REACHES: [Reach; 9] = [
-    Reach::Near(&[([0, -1], 1.0), ([0, 1], 1.0), ([-1, 0], 1.0), ([1, 0], 1.0)]),
+    NEAREST,
     Reach::Near(&[([-1, -1], 1.0), ([-1, 1], 1.0), ([1, -1], 1.0), ([1, 1], 1.0)]),
     Reach::Near(&[([0, -1], 1.0), ([0, 1], 1.0)]),
     Reach::Row,
@@ -174,7 +178,7 @@ const RING: [([isize; 2], f64); 12] = [
 
 impl Reach {
     /// Visits the others that exist, each with its weight.
-    fn visit(&self, [rows, cols]: [usize; 2], element: usize, mut visit: impl FnMut(usize, f64)) {
+    pub(super) fn visit(&self, [rows, cols]: [usize; 2], element: usize, mut visit: impl FnMut(usize, f64)) {
         let (row, col) = (element / cols, element % cols);
         match self {
             Self::Near(offsets) => {

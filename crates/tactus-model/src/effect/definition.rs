@@ -449,7 +449,7 @@ impl Effect {
     /// Checks that the elements it names are the array's.
     ///
     /// # Errors
-    /// [`EffectError::Element`].
+    /// [`EffectError::Element`], or [`EffectError::Draft`] of a draft with weights for another number of elements.
     pub fn fits(&self, array: &Array) -> Result<(), EffectError> {
         if let Some(draft) = self.definition.draft() {
             draft.fits(array)?;

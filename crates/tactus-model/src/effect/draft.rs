@@ -25,8 +25,10 @@
 
 use std::sync::Mutex;
 
+use super::crosstalk::NEAREST;
 use super::definition::{Definition, EffectError, Make, Parameter, PipelineStage};
 use super::stage::{BaseModel, Load, Now, OnCovering, OnElement, OnMotion, OnReadout, TipState};
+use super::table::between;
 use super::{REGISTRY, Values};
 use crate::trace::{Covariate, Seen, Trace};
 use crate::{Array, Contact};
@@ -108,7 +110,7 @@ const TABLE_MAX: usize = 1024;
 
 static PARAMETERS: &[Parameter] = &[Parameter::real("strength", 0.0, [-10.0, 10.0])];
 /// The drafts of this process. There are few, and effects refer to their definitions for as long as it runs.
-static DEFINED: Mutex<Vec<(&'static Draft, &'static Definition)>> = Mutex::new(Vec::new());
+static DEFINED: Mutex<Vec<&'static Definition>> = Mutex::new(Vec::new());
 
 impl Carrier {
     /// All of them.
@@ -288,17 +290,6 @@ impl Law {
     }
 }
 
-/// Straight lines between places; constant before the first and after the last.
-fn between(places: &[f64], x: f64, value: impl Fn(usize) -> f64) -> f64 {
-    let next = places.partition_point(|at| *at <= x);
-    let (before, after) = (next.saturating_sub(1), next.min(places.len() - 1));
-    let low = value(before);
-    if before == after || next == 0 {
-        return low;
-    }
-    low + (value(after) - low) * (x - places[before]) / (places[after] - places[before])
-}
-
 impl Draft {
     /// Where in the pipeline it acts: what depends on signals alone acts in the elements.
     pub fn stage(&self) -> PipelineStage {
@@ -322,7 +313,7 @@ impl Draft {
     pub fn define(self) -> Result<&'static Definition, EffectError> {
         self.check()?;
         let mut defined = DEFINED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some((_, known)) = defined.iter().find(|(draft, _)| **draft == self) {
+        if let Some(known) = defined.iter().find(|known| known.draft() == Some(&self)) {
             return Ok(known);
         }
         let draft: &'static Self = Box::leak(Box::new(self));
@@ -335,7 +326,7 @@ impl Draft {
             curve: None,
             make: Make::Draft(draft),
         }));
-        defined.push((draft, definition));
+        defined.push(definition);
         Ok(definition)
     }
 
@@ -504,7 +495,8 @@ impl OnCovering for Drafted {
                 signal_mm.iter_mut().zip(&self.values).for_each(|(u, share)| *u += share * *u);
             }
             Carrier::Neighbours => {
-                let means = means_of_neighbours(now.base.model.array().cols(), signal_mm);
+                let array = now.base.model.array();
+                let means = means_of_neighbours([array.rows(), array.cols()], signal_mm);
                 for ((u, share), mean) in signal_mm.iter_mut().zip(&self.values).zip(means) {
                     *u += share * mean;
                 }
@@ -553,20 +545,14 @@ impl OnReadout for Drafted {
     }
 }
 
-/// For each element the mean of the up to four beside it.
-fn means_of_neighbours(cols: usize, values: &[f64]) -> Vec<f64> {
-    let of = |index: usize| {
-        let (row, col) = (index / cols, index % cols);
-        let beside = [
-            (col > 0).then(|| index - 1),
-            (col + 1 < cols).then(|| index + 1),
-            (row > 0).then(|| index - cols),
-            (index + cols < values.len()).then(|| index + cols),
-        ];
-        let (sum, count) = beside
-            .into_iter()
-            .flatten()
-            .fold((0.0, 0.0), |(sum, count), one| (sum + values[one], count + 1.0));
+/// For each element the mean of the up to four nearest.
+fn means_of_neighbours([rows, cols]: [usize; 2], values: &[f64]) -> Vec<f64> {
+    let of = |element: usize| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        NEAREST.visit([rows, cols], element, |other, weight| {
+            sum += weight * values[other];
+            count += weight;
+        });
         sum / f64::max(count, 1.0)
     };
     (0..values.len()).map(of).collect()

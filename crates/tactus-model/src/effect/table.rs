@@ -67,13 +67,7 @@ impl By {
 impl Table {
     /// The value at a place.
     pub fn value(&self, place: f64) -> f64 {
-        let next = self.at.partition_point(|at| *at <= place);
-        let (before, after) = (next.saturating_sub(1), next.min(self.at.len() - 1));
-        let [low, high] = [before, after].map(|index| self.values[index]);
-        if before == after || next == 0 {
-            return low;
-        }
-        low + (high - low) * (place - self.at[before]) / (self.at[after] - self.at[before])
+        between(&self.at, place, |index| self.values[index])
     }
 
     /// Checks it as that of a parameter.
@@ -106,6 +100,17 @@ impl Table {
         }
         Ok(())
     }
+}
+
+/// Straight lines between the values at places; constant before the first and after the last.
+pub(super) fn between(at: &[f64], place: f64, value: impl Fn(usize) -> f64) -> f64 {
+    let next = at.partition_point(|at| *at <= place);
+    let (before, after) = (next.saturating_sub(1), next.min(at.len() - 1));
+    let low = value(before);
+    if before == after || next == 0 {
+        return low;
+    }
+    low + (value(after) - low) * (place - at[before]) / (at[after] - at[before])
 }
 
 /// An effect of which some parameters are tables.
