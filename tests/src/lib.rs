@@ -81,7 +81,10 @@ impl From<Output> for CommandOutput {
 /// # Panics
 /// If it cannot be started.
 pub fn tactus(folder: &Path, args: &[&str]) -> CommandOutput {
-    let output = Command::new(binary("tactus")).args(args).current_dir(folder).stdin(Stdio::null()).output();
+    let mut command = Command::new(binary("tactus"));
+    // The lab's own effects are those of the test, not of the user.
+    command.env("XDG_STATE_HOME", folder.join("state")).env_remove("STATE_DIRECTORY");
+    let output = command.args(args).current_dir(folder).stdin(Stdio::null()).output();
     output.expect("tactus starts").into()
 }
 
@@ -166,6 +169,7 @@ impl Process {
             .args(args)
             .current_dir(folder)
             .env("RUST_LOG", "info,zenoh=error")
+            .env("XDG_STATE_HOME", folder.join("state"))
             .env("PATH", format!("{}:{}", folder.join("bin").display(), env!("PATH")))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

@@ -72,7 +72,7 @@ fn discover_on_threads(
     };
     let before = search.locate(&base)?;
     let scattered = search.scattered(&base)?;
-    let Grown { at: grown, rounds, mut equivalent, refused, .. } = match options.rule {
+    let Grown { at: grown, rounds, mut equivalent, refused, exchanged, .. } = match options.rule {
         Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
@@ -98,6 +98,7 @@ fn discover_on_threads(
             rounds,
             equivalent,
             contests,
+            exchanged,
             left,
             before,
             after,

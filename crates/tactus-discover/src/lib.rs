@@ -21,10 +21,11 @@ pub use next::{
     Experiments, LeftOut, NextExperiment, OpenQuestion, Plan, Rehearsal, RehearsalOrder, WORTH_Z,
 };
 pub use search::{
-    Contest, Curve, Gap, NoDraft, NotShown, Options, Point, RefutedFormula, Rivalry, Round, Rule, TriedEffect,
+    Because, Contest, Curve, Gap, GivenUp, NoDraft, NotShown, Options, Point, RefutedFormula, Rivalry, Round,
+    Rule, TriedEffect,
 };
 pub use tactus_calibrate::{FaultKind, FaultyElement};
 pub use verdict::{
     AddedEffect, BaseModel, Confirmation, Discovery, DraftedEffect, ElementGap, Estimated, Final,
-    FittedCurve, FittedKnot, GlobalTest, Inclusion, Level, Split, Structured, Unexplained, Verdict,
+    FittedCurve, FittedKnot, GlobalTest, Inclusion, Level, Split, Stair, Structured, Unexplained, Verdict,
 };

@@ -22,7 +22,9 @@ mod draft;
 mod drift;
 mod evidence;
 mod forms;
+mod given_up;
 mod grow;
+mod hold;
 mod locate;
 mod memory;
 pub(crate) mod not_shown;
@@ -41,6 +43,8 @@ pub(crate) use draft::Drafted;
 pub use draft::NoDraft;
 pub use forms::RefutedFormula;
 pub(crate) use forms::{Formed, Refuted};
+pub(crate) use given_up::last_words;
+pub use given_up::{Because, GivenUp};
 pub(crate) use grow::{
     ALPHA, Alike, Equivalent, FLIPS, Grown, Left, POLISH_ROUNDS, Search, Tried, names, without,
 };

@@ -24,7 +24,7 @@ mod structured;
 pub(crate) use conclude::{SearchOutcome, cannot_judge, conclude, confirmed};
 pub use discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
-    Inclusion, Level, Split, Unexplained, Verdict,
+    Inclusion, Level, Split, Stair, Unexplained, Verdict,
 };
 pub(crate) use drafting::confirmation;
 pub use drafting::{Confirmation, DraftedEffect};

@@ -21,6 +21,7 @@ use std::fmt;
 
 use tactus_discover::{Discovery, Verdict};
 use tactus_model::Array;
+use tactus_schema::draft::DraftStatus;
 
 use crate::{
     document::{document, notes, sensor_header},
@@ -31,7 +32,7 @@ use crate::{
 
 pub use active::{ActiveRun, AmbiguousEffect, command};
 pub use draft::status as draft_status;
-pub use figures::{drafted_curve, element_maps, free_curve, levels, residual_against};
+pub use figures::{drafted_curve, element_maps, free_curve, residual_against, staircase};
 pub use json::discovery_json;
 pub use next::{Proposal, not_proposed, nothing_open, open, proposals};
 pub use words::in_words;
@@ -55,8 +56,21 @@ pub struct DiscoveryReport<'a> {
     pub active_ended: Option<&'a str>,
     /// What those experiments say of drafts, one sentence each.
     pub settled: &'a [String],
+    /// The lab's own effects that were tried beside those of the library.
+    pub lab: &'a [LabEffect],
     /// What discovery found, to be shown.
     pub discovery: &'a Discovery,
+}
+
+/// An effect of the lab's own library.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LabEffect {
+    /// Its name.
+    pub name: String,
+    /// What became of it.
+    pub status: DraftStatus,
+    /// SHA-256 of its file, in hexadecimal: the version.
+    pub sha256: String,
 }
 
 /// An analysed run.

@@ -27,7 +27,7 @@ pub use axis::Axis;
 pub use colour::{ColourBar, Scale};
 pub use decimate::{extremes, steps};
 pub use figure::Figure;
-pub use heat_map::{HeatMap, Image, Mosaic, Tile};
+pub use heat_map::{ElementNumbers, HeatMap, Image, Mosaic, Tile};
 pub use picture::png;
 pub use series::{Ink, Series};
 pub use sheet::{Label, Panel, Sheet};

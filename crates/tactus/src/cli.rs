@@ -85,7 +85,7 @@ enum CliCommand {
     Calibrate(CalibrateArgs),
     /// Find which effects the model is missing, fit them and report how much better it predicts; from recordings or tables.
     Discover(DiscoverArgs),
-    /// List the effects of the library and the drafts of a folder; show, rename and retire drafts.
+    /// List the effects of the library and the lab's own; show, add, rename and retire those of the lab.
     Effects(EffectsArgs),
     /// Repeat the paper on one rig: runs, calibration, mechanics, acuity and images in one report.
     Study(StudyArgs),
@@ -114,12 +114,20 @@ enum CliCommand {
     },
 }
 
+/// Folder of the lab's own effects.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LibraryOption {
+    /// Folder of the lab's own effects: drafts (.toml), tried beside those of the library. Default: `effects` in the state directory
+    /// (`$STATE_DIRECTORY` of a service, else `$XDG_STATE_HOME/tactus`, else `~/.local/state/tactus`).
+    #[arg(long, global = true, env = "TACTUS_LIBRARY", value_name = "DIR")]
+    pub(crate) library: Option<PathBuf>,
+}
+
 /// The lab's own library of effects, and what to do with it.
 #[derive(Debug, Args)]
 pub(crate) struct EffectsArgs {
-    /// Folder of drafts (.toml).
-    #[arg(long, global = true, value_name = "DIR")]
-    pub(crate) library: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) library: LibraryOption,
     #[command(subcommand)]
     pub(crate) command: Option<EffectsCommand>,
 }
@@ -132,6 +140,11 @@ pub(crate) enum EffectsCommand {
     Show {
         /// Its name.
         name: String,
+    },
+    /// Put a draft into the library under its name: every discovery tries it from then on.
+    Add {
+        /// The draft that a discovery wrote, such as discovery/draft-1.toml.
+        file: PathBuf,
     },
     /// Give a draft a name, and its file too.
     Rename {
@@ -337,9 +350,8 @@ pub(crate) struct DiscoverArgs {
     /// Folder of the lab's own experiments (.star), which may be proposed beside the built-in ones.
     #[arg(long, value_name = "DIR")]
     pub(crate) experiments: Option<PathBuf>,
-    /// Folder of drafts (.toml), the lab's own effects, which are tried beside those of the library.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) library: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) library: LibraryOption,
     /// Run the experiments that distinguish the remaining explanations, and analyse again with their recordings. Without
     /// a service they run on the embedded simulated rig; without files the first run is `diagnose`.
     #[arg(long)]

@@ -97,18 +97,18 @@ impl Problem<'_> {
         (squares > 0.0).then(|| [share, scatter.sqrt() / squares])
     }
 
-    /// Root mean square of the residuals of the elements with weight in the held-out bins, each weighted by its number of frames.
+    /// Root mean square of the residuals of the elements with weight in the held-out frames, each predicted as its bin is.
     pub(crate) fn heldout_rms_counts(&self, predicted: &[f64]) -> f64 {
-        let bins = self.predictor.bins;
-        let elements = bins.elements;
+        let (bins, frames) = (self.predictor.bins, self.predictor.frames);
         let (mut sum, mut readings) = (0.0, 0.0);
-        let of_bins = bins.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
-        for (bin, (counts, predicted)) in of_bins.filter(|(bin, _)| bins.heldout[*bin]) {
-            let frames = bins.frames_in(bin) as f64;
-            let readings_of = counts.iter().zip(predicted).zip(&self.element_weight);
-            let weighed = readings_of.filter(|(_, weight)| **weight > 0.0);
-            sum += frames * weighed.map(|((counts, of), _)| (counts - of).powi(2)).sum::<f64>();
-            readings += frames * self.weighed_elements();
+        let of_bins = predicted.chunks_exact(bins.elements).enumerate();
+        for (bin, predicted) in of_bins.filter(|(bin, _)| bins.heldout[*bin]) {
+            for frame in bins.first[bin]..bins.first[bin + 1] {
+                let readings_of = frames.counts_of(frame).iter().zip(predicted).zip(&self.element_weight);
+                let weighed = readings_of.filter(|(_, weight)| **weight > 0.0);
+                sum += weighed.map(|((counts, of), _)| (f64::from(*counts) - of).powi(2)).sum::<f64>();
+                readings += self.weighed_elements();
+            }
         }
         if readings > 0.0 { (sum / readings).sqrt() } else { 0.0 }
     }

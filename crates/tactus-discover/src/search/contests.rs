@@ -20,6 +20,7 @@
 //! felt from afar, they explained nothing: there the rival that sees the rest takes nothing over.
 
 use super::forms::Formed;
+use super::given_up::{Because, GivenUp};
 use super::grow::{Equivalent, LN_ODDS_LEAST, POLISH_ROUNDS, SHARE_AFTER_HOLD, Search, names, without};
 use super::varying::varying_effect;
 use crate::data::DiscoverError;
@@ -70,13 +71,25 @@ impl Contest {
         Self { effect, ln_odds, rivals, classes: Vec::new(), left, kept: false }
     }
 
-    /// True if the class is only the nearest form of what a rival describes. What another effect in a form of its own explains beside the
+    /// That the class was given up, if it is no name.
+    pub(crate) fn given_up(&self) -> Option<GivenUp> {
+        let strongest = || self.rivals.iter().max_by(|a, b| a.instead.total_cmp(&b.instead));
+        let because = match self.nearest_form_of() {
+            Some(rival) => Because::NearestForm(rival),
+            None => strongest().map_or(Because::Little, |strongest| Because::Rival(strongest.rival)),
+        };
+        (!self.kept).then_some(GivenUp { effect: self.effect, because })
+    }
+
+    /// A rival of which the class is only the nearest form, if there is one. What another effect in a form of its own explains beside the
     /// class is that effect's.
-    fn is_nearest_form(&self) -> bool {
-        self.rivals.iter().filter(|rival| varying_effect(rival.rival).is_none()).any(|rival| {
+    fn nearest_form_of(&self) -> Option<&'static str> {
+        let rivals = self.rivals.iter().filter(|rival| varying_effect(rival.rival).is_none());
+        let mut takes_part = rivals.filter(|rival| {
             rival.instead - rival.beside.max(0.0) > TAKEN_SHARE * self.ln_odds
                 && rival.beside > LN_ODDS_LEAST.max(BESIDE_SHARE * self.ln_odds)
-        })
+        });
+        takes_part.next().map(|rival| rival.rival)
     }
 }
 
@@ -104,7 +117,7 @@ impl Search<'_> {
             let rivals = alike.rivals.iter().map(rivalry).collect();
             let (classes, left) = (alike.classes.clone(), self.left_over(&formed.at));
             let contest = Contest { effect, ln_odds, rivals, classes, left, kept: true };
-            Some(Contest { kept: !contest.is_nearest_form(), ..contest })
+            Some(Contest { kept: contest.nearest_form_of().is_none(), ..contest })
         };
         let contests: Vec<Contest> = names.into_iter().filter_map(contest).collect();
         let lost: Vec<&'static str> =

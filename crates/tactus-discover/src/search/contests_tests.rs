@@ -2,8 +2,9 @@ use super::{Contest, Rivalry};
 
 fn is_name(ln_odds: f64, instead: f64, beside: f64) -> bool {
     let rivals = vec![Rivalry { rival: "any", instead, beside }];
-    !Contest { effect: "gain-drift", ln_odds, rivals, classes: vec![], left: 0.0, kept: true }
-        .is_nearest_form()
+    Contest { effect: "gain-drift", ln_odds, rivals, classes: vec![], left: 0.0, kept: true }
+        .nearest_form_of()
+        .is_none()
 }
 
 #[test]

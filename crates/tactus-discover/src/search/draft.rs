@@ -117,8 +117,8 @@ struct Weighed {
 }
 
 impl Search<'_> {
-    /// Drafts what a model leaves.
-    pub(crate) fn draft(&self, at: &Fitted, number: usize) -> Result<Outcome, DiscoverError> {
+    /// Drafts what a model leaves, as an effect of this name.
+    pub(crate) fn draft(&self, at: &Fitted, name: &str) -> Result<Outcome, DiscoverError> {
         let sight = Arc::new(Sight::of(self.problem, at)?);
         (self.progress)("drafting what nobody has named", 0.0);
         let atoms = grammar::atoms(self.problem, at, &sight, self.rounds);
@@ -147,8 +147,7 @@ impl Search<'_> {
             return Ok(Err(NoDraft::Class(class)));
         }
         let best = self.with_second(at, &sight, &weighed[best].atom, ln_odds, count)?;
-        let Some(AsEffect { draft, at: with, covariance, knots }) =
-            self.as_effect(at, &sight, best, number)?
+        let Some(AsEffect { draft, at: with, covariance, knots }) = self.as_effect(at, &sight, best, name)?
         else {
             return Ok(Err(NoDraft::NoGain));
         };
@@ -293,7 +292,7 @@ impl Search<'_> {
         at: &Fitted,
         sight: &Arc<Sight>,
         atom: Atom,
-        number: usize,
+        name: &str,
     ) -> Result<Option<AsEffect>, DiscoverError> {
         let mut atom = if atom.of_elements { self.with_weights(at, sight, atom)? } else { atom };
         let mut curve = self.curve(at, sight, &atom)?;
@@ -302,7 +301,7 @@ impl Search<'_> {
             curve = self.curve(at, sight, &atom)?;
         }
         let reduced = curves::reduced(&atom, &curve, excused(0.5 * curve.squares()));
-        let draft = words::named(sight, &atom, reduced.law, number);
+        let draft = words::named(sight, &atom, reduced.law, name);
         Ok(self.taken(at, draft)?.map(|(draft, fitted, by)| AsEffect {
             draft,
             at: fitted,

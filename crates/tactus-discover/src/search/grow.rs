@@ -16,6 +16,7 @@ use tactus_model::effect::Definition;
 use super::candidates::Candidate;
 use super::contests::Contest;
 use super::evidence::{Evidence, ODDS_AGAINST, Set, excused};
+use super::given_up::GivenUp;
 use super::memory::Memory;
 use super::options::Options;
 use super::pass::{Kind, Pass, rivals_win};
@@ -47,7 +48,7 @@ pub struct TriedEffect {
     pub p_value: f64,
     /// Root mean square of the held-out residuals of the model with this effect, if it was fitted.
     pub heldout_rms_counts: Option<f64>,
-    /// Share of the gap that it closes on the held-out presses, if it was fitted.
+    /// Share of the gap that it closes on the held-out presses, if it was fitted and there is one.
     pub shrink: Option<f64>,
 }
 
@@ -59,21 +60,16 @@ pub(crate) const ALPHA: f64 = 0.005;
 pub(crate) const NAMES_MAX: usize = 5;
 /// Rounds of a fit that compares candidates: of all, and of the best.
 const FIRST_ROUNDS: usize = 2;
-const TRIAL_ROUNDS: usize = 6;
+pub(super) const TRIAL_ROUNDS: usize = 6;
 /// Rounds of a fit of a model that is kept.
 pub(crate) const POLISH_ROUNDS: usize = 8;
 /// Greatest number of classes that a round fits, and that it fits to the end.
 const FITTED_MAX: usize = 5;
 const FINISHED_MAX: usize = 2;
 /// A class is fitted if its first step promises this share of the best one's odds.
-const PROMISE_SHARE: f64 = 0.3;
+pub(super) const PROMISE_SHARE: f64 = 0.3;
 /// Logarithm of the odds with which a class is added and holds its place.
 pub(super) const LN_ODDS_LEAST: f64 = 5.0;
-/// Another class takes the place of one if its odds are greater by this logarithm.
-const BETTER_LN_ODDS: f64 = 3.0;
-const EXCHANGES_MAX: usize = 4;
-/// Greatest number of other classes that are fitted in a class's place.
-const OTHERS_MAX: usize = 4;
 /// Real physics has not quite the form of the library: differences of the logarithm of the odds count for one part in
 /// `1 + MISFIT_SHARE x gain`. From tuning sets: `just discovery-constants` prints how many sets hold the hidden class at each value, and
 /// their size.
@@ -83,15 +79,8 @@ const MISFIT_SHARE: f64 = 0.02;
 const LEFT_SHARE: f64 = 1.0 / 3.0;
 /// A class with less than this share of the strongest one's odds may be an error of that one's form. From tuning sets: 95 % of the wrong
 /// classes beside a right one are within it (`just discovery-constants`).
-const FORM_SHARE: f64 = 0.07;
-/// A class must gain so many standard errors, from the scatter of blocks.
-const BLOCKS_Z: f64 = 2.0;
-/// Probability of a reported set of classes, and by how many units one at its end is behind the best.
-const SET_PROBABILITY: f64 = 0.95;
-const SET_UNITS: f64 = 3.0;
-
-/// Estimated shares of a discovery that are done before the classes have to hold their places, and after.
-const SHARE_BEFORE_HOLD: f64 = 0.65;
+pub(super) const FORM_SHARE: f64 = 0.07;
+/// Estimated share of a discovery that is done when the classes have held their places.
 pub(super) const SHARE_AFTER_HOLD: f64 = 0.85;
 
 /// Data, candidates and options of a search.
@@ -150,8 +139,10 @@ pub(crate) struct Grown {
     path: Vec<Fitted>,
     /// Classes that lost against a rival without a name, or are too small beside another.
     pub(crate) refused: Vec<Contest>,
+    /// Effects that another one replaced.
+    pub(crate) exchanged: Vec<GivenUp>,
     /// Classes that lost their place against a rival, and the others of the model then: beside these they are not tried again.
-    barred: Vec<(Vec<&'static str>, &'static str)>,
+    pub(super) barred: Vec<(Vec<&'static str>, &'static str)>,
 }
 
 impl From<Fitted> for Grown {
@@ -162,6 +153,7 @@ impl From<Fitted> for Grown {
             rounds: Vec::new(),
             equivalent: Equivalent::new(),
             refused: Vec::new(),
+            exchanged: Vec::new(),
             barred: Vec::new(),
         }
     }
@@ -169,7 +161,7 @@ impl From<Fitted> for Grown {
 
 impl Grown {
     /// The model of the path that has the same terms as this one, with other values.
-    fn passed(&self, model: &Parameters) -> Option<&Fitted> {
+    pub(super) fn passed(&self, model: &Parameters) -> Option<&Fitted> {
         self.path.iter().find(|passed| passed.parameters.has_terms_like(model))
     }
 }
@@ -189,7 +181,7 @@ impl Search<'_> {
     pub(crate) fn grow(&self, base: &Fitted) -> Result<Grown, DiscoverError> {
         let mut grown = Grown::from(base.clone());
         loop {
-            self.add_classes(base, &mut grown)?;
+            self.add_classes(&mut grown)?;
             let barred = grown.barred.len();
             self.hold(&mut grown)?;
             // Where a class has lost its place, another may have it.
@@ -200,7 +192,7 @@ impl Search<'_> {
     }
 
     /// Adds classes until none is missing.
-    fn add_classes(&self, base: &Fitted, grown: &mut Grown) -> Result<(), DiscoverError> {
+    fn add_classes(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
         let mut strongest = 0.0_f64;
         loop {
             let index = grown.rounds.len();
@@ -218,7 +210,7 @@ impl Search<'_> {
             };
             grown.refused.extend(refused);
             for fit in &fits {
-                self.tell(fit, base, &mut tried.round);
+                self.tell(fit, &mut tried.round);
             }
             let (taken, small) = match fits.into_iter().next() {
                 Some(best) if best.ln_odds > least => (Some(best), None),
@@ -254,11 +246,6 @@ impl Search<'_> {
         };
         let names = self.candidates.iter().map(|candidate| candidate.definition.name);
         Ok(Left { p_value, probabilities: names.map(|name| (name, probability(name))).collect() })
-    }
-
-    /// True if the residual of a model depends on any covariate.
-    fn leaves_something(&self, at: &Fitted) -> Result<bool, DiscoverError> {
-        Ok(self.locate(at)?.p_value <= ALPHA)
     }
 
     /// Tests all additions at once: the largest score against those under flipped signs.
@@ -311,12 +298,10 @@ impl Search<'_> {
         }
     }
 
-    /// Figures of a fitted class on the held-out presses, for the report alone.
-    fn tell(&self, fit: &Beside, base: &Fitted, round: &mut Round) {
-        let gap = |fitted: &Fitted| self.problem.heldout_gap(&fitted.predicted).value;
+    /// The residual of a fitted class on the held-out presses, for the report alone.
+    fn tell(&self, fit: &Beside, round: &mut Round) {
         if let Some(tried) = round.candidates.iter_mut().find(|one| one.effect == fit.name) {
             tried.heldout_rms_counts = Some(self.problem.heldout_rms_counts(&fit.fitted.predicted));
-            tried.shrink = Some(1.0 - gap(&fit.fitted) / gap(base)).filter(|_| gap(base) > 0.0);
         }
     }
 
@@ -382,7 +367,7 @@ impl Search<'_> {
 
     /// Starts of fits of a class: its members of a set; if these are several, the best of them; and if they are several or free, its best formula.
     /// A fit of several may end at worse values than one of a single shape, or gain too little for all its numbers.
-    fn starts_of(
+    pub(super) fn starts_of(
         &self,
         pass: &Pass,
         evidence: &Evidence<'_>,
@@ -431,7 +416,7 @@ impl Search<'_> {
 
     /// Fits of a model with the terms of each class: first all in a few rounds, then the best to the end, and those that are behind them by
     /// no more than so many units.
-    fn fits(
+    pub(super) fn fits(
         &self,
         at: &Fitted,
         starts: &[(&'static str, Vec<Term>)],
@@ -500,153 +485,30 @@ impl Search<'_> {
         if self.rounds { (at.cost / self.problem.readings()).max(1.0) } else { 1.0 }
     }
 
-    /// Lets each class hold its place: against the model without it, rivals without a name, and other classes.
-    fn hold(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
-        let mut exchanges_left = EXCHANGES_MAX;
-        'again: loop {
-            // Whether the model leaves something, once that is asked.
-            let mut leaves: Option<bool> = None;
-            grown.equivalent.clear();
-            let names = names(&grown.at.parameters, self.known_terms);
-            let without = |name: &&'static str| {
-                (self.progress)(&format!("without {name}"), SHARE_BEFORE_HOLD);
-                let less = without(&grown.at.parameters, name, self.known_terms);
-                self.fitted(grown, less, TRIAL_ROUNDS)
-            };
-            let lesses: Vec<Fitted> =
-                parallel::map(&names, without).into_iter().collect::<Result<_, DiscoverError>>()?;
-            let odds: Vec<f64> = lesses.iter().map(|less| self.ln_odds(less, &grown.at)).collect();
-            let worth = |(index, less): (usize, &Fitted)| self.worth(&grown.at, less, index, &names, &odds);
-            let worths: Vec<f64> = lesses.iter().enumerate().map(worth).collect();
-            let weakest = worths.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
-            if let Some((weakest, _)) = weakest.filter(|(_, worth)| **worth < 1.0) {
-                grown.refused.push(self.too_small(names[weakest], odds[weakest], &grown.at));
-                grown.at = self.fitted(grown, lesses[weakest].parameters.clone(), POLISH_ROUNDS)?;
-                continue 'again;
-            }
-            for (nth, ((name, less), ln_odds)) in names.iter().zip(lesses).zip(odds.clone()).enumerate() {
-                let share = nth as f64 / names.len() as f64;
-                (self.progress)(
-                    &format!("comparing {name} with others in its place"),
-                    SHARE_BEFORE_HOLD + share * (SHARE_AFTER_HOLD - SHARE_BEFORE_HOLD),
-                );
-                let pass = self.pass(&less)?;
-                let (strength, mut rivals) = pass.rivalry(name, ln_odds);
-                let odds_of = |effect| names.iter().zip(&odds).find(|(name, _)| **name == effect);
-                let is_stronger = |effect| odds_of(effect).is_some_and(|(_, odds)| *odds > ln_odds);
-                rivals.retain(|(rival, _)| varying_effect(rival).is_none_or(is_stronger));
-                let unit = self.unit(ln_odds, &grown.at);
-                if rivals_win(&rivals, strength) {
-                    grown.refused.push(Contest::lost(name, ln_odds, self.left_over(&grown.at), rivals));
-                    grown.barred.push((self.sorted_names(&less), name));
-                    grown.at = self.fitted(grown, less.parameters, POLISH_ROUNDS)?;
-                    continue 'again;
-                }
-                if is_exact(name) {
-                    // No other effect acts like miswired elements.
-                    continue;
-                }
-                let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
-                let likeliest = others.iter().max_by(|a, b| self.rank(a).total_cmp(&self.rank(b)));
-                let present = self.rank_of(name, ln_odds, &grown.at);
-                let better =
-                    likeliest.filter(|best| self.rank(best) > present + BETTER_LN_ODDS && exchanges_left > 0);
-                if let Some(better) = better {
-                    exchanges_left -= 1;
-                    grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
-                    continue 'again;
-                }
-                let classes = others.iter().map(|other| (other.name, other.ln_odds)).collect();
-                let model_leaves = match leaves {
-                    Some(known) => known,
-                    None if others.is_empty() => true,
-                    None => *leaves.insert(self.leaves_something(&grown.at)?),
-                };
-                // Where the model leaves nothing, its form is right, and only the other class needs another form than its own.
-                let form_odds = if model_leaves { 1.0 } else { unit.sqrt() };
-                let probabilities = probabilities(name, ln_odds, unit, form_odds, &others);
-                let mut same = Vec::new();
-                for (other, fitted) in credible(&probabilities, others) {
-                    // Its form is no excuse for a class that leaves something where the model leaves nothing.
-                    if model_leaves || !self.leaves_something(&fitted)? {
-                        same.push((other, fitted));
-                    }
-                }
-                grown.equivalent.insert(name, Alike { without: less, same, probabilities, rivals, classes });
-            }
-            return Ok(());
-        }
-    }
-
     /// Names of the added effects of a model, sorted.
-    fn sorted_names(&self, at: &Fitted) -> Vec<&'static str> {
+    pub(super) fn sorted_names(&self, at: &Fitted) -> Vec<&'static str> {
         let mut names = names(&at.parameters, self.known_terms);
         names.sort_unstable();
         names
     }
 
-    /// A model fitted from these values, or the one that the rounds passed.
-    fn fitted(&self, grown: &Grown, from: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
-        match grown.passed(&from) {
-            Some(passed) => Ok(passed.clone()),
-            None => self.problem.fit_from(from, rounds),
-        }
-    }
-
-    fn too_small(&self, name: &'static str, ln_odds: f64, at: &Fitted) -> Contest {
+    pub(super) fn too_small(&self, name: &'static str, ln_odds: f64, at: &Fitted) -> Contest {
         Contest::lost(name, ln_odds, self.left_over(at), Vec::new())
-    }
-
-    /// What a class gains over the least gain with which it holds its place: from 1 on it does. What is small beside the
-    /// gain of another class may be that one's form, and blocks must agree.
-    fn worth(&self, at: &Fitted, less: &Fitted, index: usize, names: &[&'static str], odds: &[f64]) -> f64 {
-        let others = names
-            .iter()
-            .zip(odds)
-            .enumerate()
-            .filter(|(other, (name, _))| *other != index && !is_exact(name));
-        let strongest = others.map(|(_, (_, odds))| *odds).fold(0.0, f64::max);
-        let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
-        let by_odds = odds[index] / least;
-        if [at, less].iter().any(|one| one.parameters.walk.is_some()) {
-            // A walk fits the noise of the blocks too.
-            return by_odds;
-        }
-        let [gain, error] = self.problem.fitted_gain(less, at);
-        by_odds.min(gain / (BLOCKS_Z * error).max(f64::MIN_POSITIVE))
-    }
-
-    /// The other classes, fitted in a place, if their first steps promise these odds.
-    pub(crate) fn others(
-        &self,
-        pass: &Pass,
-        less: &Fitted,
-        names: &[&'static str],
-        ln_odds_least: f64,
-    ) -> Result<Vec<Beside>, DiscoverError> {
-        let evidence = pass.evidence();
-        let among = pass.among(|name| !names.contains(&name));
-        let mut best = evidence.sets_of_classes(&among, ln_odds_least);
-        best.truncate(OTHERS_MAX);
-        let start = |set: &Set| self.starts_of(pass, &evidence, set, pass.class_of(set.members[0]));
-        let starts: Vec<(&'static str, Vec<Term>)> = best.iter().flat_map(start).collect();
-        // Where the form misses much, more of them may be in the set.
-        self.fits(less, &starts, SET_UNITS)
     }
 
     /// By what classes in one place are ranked: the logarithm of the odds, less that for which a formula is excused if it has a free part. One
     /// that the model has already takes up its own misfit.
-    fn rank(&self, one: &Beside) -> f64 {
+    pub(super) fn rank(&self, one: &Beside) -> f64 {
         if one.again { one.ln_odds } else { self.rank_of(one.name, one.ln_odds, &one.fitted) }
     }
 
-    fn rank_of(&self, name: &str, ln_odds: f64, at: &Fitted) -> f64 {
+    pub(super) fn rank_of(&self, name: &str, ln_odds: f64, at: &Fitted) -> f64 {
         let is_free = self.added(at, name).any(Term::is_free);
         ln_odds - if is_free { excused(ln_odds) } else { 0.0 }
     }
 
     /// What counts as one in differences of the logarithm of the odds between classes in one place.
-    fn unit(&self, ln_odds: f64, at: &Fitted) -> f64 {
+    pub(super) fn unit(&self, ln_odds: f64, at: &Fitted) -> f64 {
         1.0 + MISFIT_SHARE * ln_odds.max(0.0) + LEFT_SHARE * self.left_over(at)
     }
 
@@ -661,41 +523,8 @@ fn share_before(round: usize) -> f64 {
     1.0 - 0.9 * 0.7_f64.powf(round as f64)
 }
 
-/// Probabilities of a class with these odds, and of others in its place; likeliest others first.
-fn probabilities(
-    name: &'static str,
-    ln_odds: f64,
-    unit: f64,
-    form_odds: f64,
-    others: &[Beside],
-) -> Vec<(&'static str, f64)> {
-    let mut weights = vec![(name, 1.0)];
-    weights.extend(
-        others.iter().map(|other| (other.name, ((other.ln_odds - ln_odds) / unit).exp() / form_odds)),
-    );
-    weights[1..].sort_by(|a, b| b.1.total_cmp(&a.1));
-    let total: f64 = weights.iter().map(|(_, weight)| weight).sum();
-    weights.into_iter().map(|(name, weight)| (name, weight / total)).collect()
-}
-
-/// The other classes of the smallest set that has, with the first class, the wanted probability.
-fn credible(probabilities: &[(&'static str, f64)], mut others: Vec<Beside>) -> Vec<(&'static str, Fitted)> {
-    let mut reached = 0.0;
-    let mut same = Vec::new();
-    for (place, (name, probability)) in probabilities.iter().enumerate() {
-        if reached >= SET_PROBABILITY {
-            break;
-        }
-        reached += probability;
-        if let Some(other) = others.iter().position(|other| place > 0 && other.name == *name) {
-            same.push((*name, others.swap_remove(other).fitted));
-        }
-    }
-    same
-}
-
 /// True if an effect has the same form in reality as in the library: wiring is right or wrong.
-fn is_exact(name: &str) -> bool {
+pub(super) fn is_exact(name: &str) -> bool {
     name == MISWIRED
 }
 

@@ -6,17 +6,17 @@ use tactus_model::{Effect, Response};
 
 use super::discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
-    Inclusion, Level, Split, Unexplained, Verdict,
+    Inclusion, Level, Split, Stair, Unexplained, Verdict,
 };
-use super::drafting::{Drafting, drafted};
+use super::drafting::{DraftedEffect, Drafting, drafted};
 use super::held_out::{HeldOutResidual, SEEN_NOISE, closed_share};
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
-    ALPHA, Alike, Contest, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS,
-    Refuted, RefutedFormula, Rule, Scattered, Search, Tried, names, not_shown, q_values, sign_flip_p,
-    without,
+    ALPHA, Alike, Because, Contest, Equivalent, FLIPS, Formed, GivenUp, Left, Located, NoDraft, NotShown,
+    Options, POLISH_ROUNDS, Refuted, RefutedFormula, Round, Rule, Scattered, Search, Tried, last_words,
+    names, not_shown, q_values, sign_flip_p, without,
 };
 
 /// An effect is confirmed if noise alone would let it gain as much, on fitted presses that its parameters have not seen, with at most this
@@ -36,6 +36,8 @@ pub(crate) struct SearchOutcome {
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
     pub(crate) contests: Vec<Contest>,
+    /// Effects that another one replaced.
+    pub(crate) exchanged: Vec<GivenUp>,
     /// What the grown model may still lack.
     pub(crate) left: Left,
     /// Where the base model and the data disagree, and where the grown model still does.
@@ -117,6 +119,7 @@ pub(crate) fn conclude(
         rounds,
         equivalent,
         contests,
+        exchanged,
         left,
         before,
         after,
@@ -150,6 +153,8 @@ pub(crate) fn conclude(
         drafted(prepared, search, verdict, (&grown, &of_grown), floor)?;
     let noise_counts = floor.rms_counts().unwrap_or(0.0);
     let levels = [base_level, grown_level].map(|level| level.heldout_rms_counts);
+    let staircase = search.staircase(&grown, levels, &steps, draft.as_ref())?;
+    let given_up = given_up(exchanged, &contests, &tentative, &steps);
 
     let mut not_shown = lacking;
     not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.reach)));
@@ -168,6 +173,7 @@ pub(crate) fn conclude(
     })?;
 
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
+    let share = share_unexplained(verdict, named || lattice.is_some(), share);
     let mut warnings = prepared.warnings.clone();
     warnings.extend(prepared.not_judged(&of_grown, floor));
     warnings.extend(few_presses(&agreed));
@@ -178,7 +184,9 @@ pub(crate) fn conclude(
         global: Some(GlobalTest { statistic: before.statistic, p_value }),
         curves: search.curves(&base, &grown)?,
         elements: of_base.elements_beside(&of_grown),
-        rounds: rounds.into_iter().map(|tried| tried.round).collect(),
+        rounds: rounds.into_iter().map(|tried| with_shares(tried.round, levels[0], noise_counts)).collect(),
+        given_up,
+        staircase,
         inclusions: inclusions(&steps, &equivalent, &left),
         contests,
         steps,
@@ -189,19 +197,14 @@ pub(crate) fn conclude(
         },
         verdict,
         draft,
-        unexplained: Unexplained {
-            depends_on: if is_left && !is_clean {
-                depends_on(&after, [scatters[1], noise_of_grown])
-            } else {
-                Vec::new()
-            },
-            share: match verdict {
-                Verdict::NothingMissing => 0.0,
-                Verdict::CannotJudge | Verdict::Unexplained => 1.0,
-                // Faulty elements are in the base, so that nothing of its gap is left to close.
-                Verdict::Explained if !named && lattice.is_none() => 0.0,
-                Verdict::Explained | Verdict::PartlyExplained => share,
-            },
+        unexplained: if is_left && !is_clean {
+            Unexplained {
+                depends_on: depends_on(&after, [scatters[1], noise_of_grown]),
+                gap: after.gap.clone(),
+                share,
+            }
+        } else {
+            Unexplained { depends_on: Vec::new(), gap: Vec::new(), share }
         },
         plan,
         effects,
@@ -209,6 +212,40 @@ pub(crate) fn conclude(
         gap: before.gap.clone(),
         ..prepared.unjudged(&of_base, base_level, options)?
     })
+}
+
+/// The share of the gap that a model with this verdict leaves unexplained, of `left`, what it leaves.
+fn share_unexplained(verdict: Verdict, is_added: bool, left: f64) -> f64 {
+    match verdict {
+        Verdict::NothingMissing => 0.0,
+        Verdict::CannotJudge | Verdict::Unexplained => 1.0,
+        // Faulty elements are in the base, so that nothing of its gap is left to close.
+        Verdict::Explained if !is_added => 0.0,
+        Verdict::Explained | Verdict::PartlyExplained => left,
+    }
+}
+
+/// A round with the share of the gap that each fitted effect closes.
+fn with_shares(mut round: Round, base_rms_counts: f64, noise_counts: f64) -> Round {
+    for tried in &mut round.candidates {
+        tried.shrink =
+            tried.heldout_rms_counts.and_then(|rms| closed_share([base_rms_counts, rms], noise_counts));
+    }
+    round
+}
+
+/// Effects that were fitted and are not in the model with these steps, and why.
+fn given_up(
+    exchanged: Vec<GivenUp>,
+    contests: &[Contest],
+    tentative: &[AddedEffect],
+    steps: &[AddedEffect],
+) -> Vec<GivenUp> {
+    let unconfirmed =
+        tentative.iter().map(|step| GivenUp { effect: step.effect, because: Because::Unconfirmed });
+    let all = exchanged.into_iter().chain(contests.iter().filter_map(Contest::given_up)).chain(unconfirmed);
+    let present: Vec<&str> = steps.iter().map(|step| step.effect).collect();
+    last_words(all.collect(), &present)
 }
 
 /// A warning if effects are confirmed by all of too few blocks.
@@ -394,7 +431,9 @@ impl Prepared<'_> {
             contests: Vec::new(),
             final_: Final { level, shrink: None },
             verdict: Verdict::CannotJudge,
-            unexplained: Unexplained { depends_on: Vec::new(), share: 1.0 },
+            given_up: Vec::new(),
+            staircase: Vec::new(),
+            unexplained: Unexplained { depends_on: Vec::new(), gap: Vec::new(), share: 1.0 },
             draft: None,
             plan: Plan::default(),
             grown: recalibrated.clone(),
@@ -425,6 +464,41 @@ impl Search<'_> {
     fn share_of(&self, base: &Fitted, grown: &Fitted, left: f64) -> f64 {
         let [closed, _] = self.problem.heldout_gain(base, grown);
         if closed + left > 0.0 { (left / (closed + left)).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
+    /// The residual on held-out presses as the grown model is built up, from the base model: with each added effect in order, all else fitted
+    /// again, and with the draft.
+    fn staircase(
+        &self,
+        grown: &Fitted,
+        [base_rms_counts, grown_rms_counts]: [f64; 2],
+        steps: &[AddedEffect],
+        draft: Option<&Result<Box<DraftedEffect>, NoDraft>>,
+    ) -> Result<Vec<Stair>, DiscoverError> {
+        let stair = |with: &str, heldout_rms_counts| Stair { with: with.to_owned(), heldout_rms_counts };
+        let names = names(&grown.parameters, self.known_terms);
+        let mut stairs = vec![stair("base model", base_rms_counts)];
+        for (place, name) in names.iter().enumerate() {
+            let later = &names[place + 1..];
+            // That of the model without the last one is known.
+            let known = steps.iter().find(|step| later == [step.effect]);
+            let rms_counts = match (later.is_empty(), known) {
+                (true, _) => grown_rms_counts,
+                (false, Some(step)) => step.heldout_rms_before_counts,
+                (false, None) => {
+                    let part = later
+                        .iter()
+                        .fold(grown.parameters.clone(), |part, name| without(&part, name, self.known_terms));
+                    let fitted = self.problem.fit_from(part, POLISH_ROUNDS)?;
+                    self.problem.heldout_rms_counts(&fitted.predicted)
+                }
+            };
+            stairs.push(stair(name, rms_counts));
+        }
+        if let Some(Ok(draft)) = draft {
+            stairs.push(stair(&draft.draft.name, draft.heldout_rms_after_counts));
+        }
+        Ok(stairs)
     }
 
     /// The added effects, those of faulty elements included, each name once. `with_silent` is the problem in which dead and stuck elements

@@ -9,7 +9,7 @@ use super::structured::Structured;
 use crate::data::Floor;
 use crate::fit::RunWalks;
 use crate::next::Plan;
-use crate::search::{Contest, Curve, Gap, NoDraft, NotShown, RefutedFormula, Round};
+use crate::search::{Contest, Curve, Gap, GivenUp, NoDraft, NotShown, RefutedFormula, Round};
 
 /// What the data say about a model, and what they add to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +43,10 @@ pub struct Discovery {
     pub elements: Vec<ElementGap>,
     /// Each round of the search: which effects were tried, and with what result.
     pub rounds: Vec<Round>,
+    /// Effects that were fitted and are not in the grown model, and why.
+    pub given_up: Vec<GivenUp>,
+    /// The residual as the grown model is built up, from the base model; empty if nothing was judged.
+    pub staircase: Vec<Stair>,
     /// The effects that were added, in the order in which they were found; one entry for each name.
     pub steps: Vec<AddedEffect>,
     /// Effects that a fit shows, and that fitted presses which their parameters have not seen do not confirm. They are not in the grown model.
@@ -108,6 +112,15 @@ pub struct Level {
     pub heldout_chi2: Option<f64>,
     /// The part of the residuals that is not noise; `None` without a floor.
     pub structured: Option<Structured>,
+}
+
+/// A step of the way from the base model to the grown one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stair {
+    /// What was added last: `base model`, an effect, or the draft.
+    pub with: String,
+    /// Root mean square of the residuals on the held-out presses, with all that was added so far.
+    pub heldout_rms_counts: f64,
 }
 
 /// A Monte-Carlo test for structure of any kind. It stays calibrated under autocorrelated noise.
@@ -233,6 +246,8 @@ pub enum Verdict {
 pub struct Unexplained {
     /// The covariates on which the remainder depends, strongest first; empty if only noise remains.
     pub depends_on: Vec<&'static str>,
+    /// Where the remainder is, strongest first.
+    pub gap: Vec<Gap>,
     /// Share of the base model's gap.
     pub share: f64,
 }

@@ -71,9 +71,15 @@ pub(super) fn drafted(
         return Ok(Drafting::default());
     }
     let known = &prepared.known.effects;
-    let of_model = known.iter().filter(|effect| effect.definition().draft().is_some()).count();
-    let number = 1 + prepared.known.drafts.len() + of_model;
-    let found = match search.draft(grown, number)? {
+    let is_known = |name: &str| {
+        known.iter().any(|effect| effect.name() == name)
+            || prepared.known.drafts.iter().any(|one| one.name == name)
+    };
+    // One of these is free.
+    let numbers = 1..=known.len() + prepared.known.drafts.len() + 1;
+    let name =
+        numbers.map(|number| format!("draft-{number}")).find(|name| !is_known(name)).unwrap_or_default();
+    let found = match search.draft(grown, &name)? {
         Ok(found) => *found,
         Err(none) => return Ok(Drafting { draft: Some(Err(none)), model: None }),
     };

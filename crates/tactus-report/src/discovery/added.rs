@@ -13,6 +13,8 @@ use crate::{
     numbers::{digits, short, with_error},
 };
 
+/// A parameter nearer to the end of its range than this share of it is at its end.
+const BOUND_SHARE: f64 = 1e-3;
 /// A probability worth a line of its own.
 const SAID_LEAST: f64 = 0.1;
 
@@ -70,6 +72,7 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect, own: Option<&Definition>
     let summary = definition.map_or("", |definition| definition.summary);
     writeln!(f, "<h3>{}</h3>\n<p>{}.</p>", Text(step.effect), Text(capital(summary)))?;
     let mut nth = 0;
+    let mut flags: Vec<String> = Vec::new();
     // Terms of one effect may have different parameters.
     for terms in step.terms.chunk_by(|one, other| names(one).eq(names(other))) {
         let parameters = terms.first().map_or(&[][..], Vec::as_slice);
@@ -85,10 +88,14 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect, own: Option<&Definition>
             table.row([name].into_iter().chain(term.iter().map(value)));
         }
         if let Some(definition) = definition {
+            flags.extend(terms.iter().flatten().filter_map(|found| flag(definition, found)));
             let range = |found: &Estimated| range(definition, found);
             table.row(["possible range".to_owned()].into_iter().chain(parameters.iter().map(range)));
         }
         writeln!(f, "{table}")?;
+    }
+    for flag in flags {
+        writeln!(f, "<p class=\"warn\">{}</p>", Text(flag))?;
     }
     step.curves.iter().try_for_each(|curve| self::curve(f, step.effect, curve))?;
     writeln!(
@@ -167,6 +174,27 @@ fn range(definition: &Definition, found: &Estimated) -> String {
         Some(parameter) => parameter.range.map(|end| short(end, 6)).join(" to "),
         None => String::new(),
     }
+}
+
+/// A warning of a parameter at the end of its range, or one that the data hardly determine.
+fn flag(definition: &Definition, found: &Estimated) -> Option<String> {
+    let known = definition.parameters.iter().find(|known| known.name == found.name)?;
+    let error = found.standard_error?;
+    let Estimated { name, value, .. } = found;
+    let slack = BOUND_SHARE * (known.range[1] - known.range[0]);
+    if let Some(end) = known.range.into_iter().find(|end| (value - end).abs() <= slack) {
+        // Many parameters do nothing at the end of their range, and may be there.
+        let is_neutral = (end - known.neutral).abs() <= slack;
+        let what = if is_neutral {
+            "does nothing"
+        } else {
+            "is at the end of its range: the true value may lie beyond"
+        };
+        return Some(format!("{name} {what}."));
+    }
+    (value.abs() < error).then(|| {
+        format!("{name} has a standard error greater than its value: these data hardly determine it.")
+    })
 }
 
 /// `a`, `a or b`, `a, b or c`.

@@ -6,8 +6,8 @@ use tactus_discover::{Discovery, Level, Verdict};
 
 use super::{
     draft,
-    figures::levels,
-    next,
+    figures::staircase,
+    gap, next,
     words::{list, percent},
 };
 use crate::{
@@ -62,10 +62,11 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
     writeln!(
         f,
         "<section>\n<h2>The gap before and after</h2>\n<figure>\n{}\n<figcaption>Root mean square of the residual on held-out presses, in \
-         counts.</figcaption>\n</figure>\n{table}\n<p class=\"lead\">The gap is the part of the residual beyond noise: the square root of the \
+         counts: from the base model to the grown one, with each effect in the order in which it was added and all else fitted \
+         again.</figcaption>\n</figure>\n{table}\n<p class=\"lead\">The gap is the part of the residual beyond noise: the square root of the \
          difference of their mean squares. What is structured is not noise: among all held-out readings, or among those with a signal if more is \
          structured there. {}</p>\n</section>",
-        levels(found),
+        staircase(found),
         found.final_.shrink.map_or_else(String::new, |share| format!(
             "{} of the base model's gap was closed, in mean squares.",
             percent(share)
@@ -87,6 +88,9 @@ fn unexplained(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
              not contain it.</p>",
             Text(list(&found.unexplained.depends_on))
         )?;
+        if !found.unexplained.gap.is_empty() {
+            writeln!(f, "{}", gap::table_of(&found.unexplained.gap))?;
+        }
     }
     writeln!(f, "</section>")
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::DiscoveryReport;
+use super::{DiscoveryReport, LabEffect};
 use crate::{
     document::{Column, Table},
     numbers::{count, digits, short},
@@ -59,5 +59,17 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
         let (frames, presses) = (count(source.frames), count(source.presses));
         table.row([&source.id, &frames, &presses, &source.sha256]);
     }
-    writeln!(f, "</table>\n</div>\n{table}</section>")
+    writeln!(f, "</table>\n</div>\n{table}")?;
+    if !report.lab.is_empty() {
+        let mut table = Table::new(&[
+            Column::Name("effect of the lab"),
+            Column::Name("status"),
+            Column::Prose("SHA-256 of its file"),
+        ]);
+        for LabEffect { name, status, sha256 } in report.lab {
+            table.row([name, status.name(), sha256]);
+        }
+        writeln!(f, "<p>Tried beside the effects of the library:</p>\n{table}")?;
+    }
+    writeln!(f, "</section>")
 }

@@ -81,11 +81,7 @@ fn drafted(f: &mut fmt::Formatter<'_>, found: &Discovery, one: &DraftedEffect) -
     let nearest: Vec<String> =
         one.nearest.iter().map(|(name, behind)| format!("{name} ({} behind)", digits(*behind, 3))).collect();
     let noise = found.floor.rms_counts();
-    let level = |counts: f64| {
-        let in_noise = noise
-            .map_or_else(String::new, |noise| format!(", {} times the noise", digits(counts / noise, 3)));
-        format!("{} counts rms{in_noise}", digits(counts, 3))
-    };
+    let level = |counts: f64| words::level(counts, noise);
     let alike = if one.alike.is_empty() { "none".to_owned() } else { one.alike.join("; ") };
     for (what, value) in [
         ("stage", stage_name(draft.stage()).to_owned()),

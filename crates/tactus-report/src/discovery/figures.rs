@@ -2,12 +2,14 @@
 
 use std::fmt;
 
-use tactus_discover::{Curve, Discovery, DraftedEffect, ElementGap, FittedCurve, Point};
+use tactus_discover::{Curve, Discovery, DraftedEffect, ElementGap, FittedCurve, Point, Stair};
 use tactus_model::Array;
 
 use crate::{
     numbers::digits,
-    plot::{Axis, ColourBar, Figure, HeatMap, Image, Ink, Label, Panel, Scale, Series, Sheet},
+    plot::{
+        Axis, ColourBar, ElementNumbers, Figure, HeatMap, Image, Ink, Label, Panel, Scale, Series, Sheet,
+    },
 };
 
 /// Names of the two models.
@@ -18,13 +20,13 @@ const CURVE_PX: [f64; 2] = [344.0, 240.0];
 /// Width between two maps.
 const GUTTER_PX: f64 = 40.0;
 /// Width of the bars' names, and of the longest bar.
-const BARS_PX: [f64; 2] = [290.0, 480.0];
+const BARS_PX: [f64; 2] = [220.0, 480.0];
 /// Height of a bar and the space below it.
 const BAR_PX: f64 = 26.0;
 
 /// Mean residual against a covariate, with standard errors: base model and, if different, grown model.
 pub fn residual_against(curve: &Curve) -> Figure {
-    let x = Axis::new(curve.covariate, curve.unit).tight();
+    let x = along(curve.covariate, curve.unit);
     let y = Axis::new("residual", curve.of).from_zero();
     let ends = [curve.points.first(), curve.points.last()].into_iter().flatten();
     let zero = Series::line(ends.map(|end| [end.at, 0.0]).collect()).ink(Ink::Muted).width_px(1.0);
@@ -39,6 +41,12 @@ pub fn residual_against(curve: &Curve) -> Figure {
     }
     let [bars, dots] = means(curve, |point| point.after);
     figure.with(bars.ink(Ink::Blue)).with(dots.ink(Ink::Blue).label(AFTER))
+}
+
+/// The axis of a covariate: of a time that begins with an event logarithmic.
+fn along(covariate: &str, unit: &str) -> Axis {
+    let axis = Axis::new(covariate, unit).tight();
+    if covariate.starts_with("time since") { axis.logarithmic() } else { axis }
 }
 
 /// A free curve or a table with the standard errors of its knots, beside the formula that it replaces.
@@ -72,7 +80,7 @@ pub fn free_curve(effect: &str, curve: &FittedCurve) -> Figure {
 pub fn drafted_curve(found: &DraftedEffect) -> Figure {
     let draft = &found.draft;
     let covariate = draft.covariates[0];
-    let x = Axis::new(covariate.name(), covariate.unit()).tight();
+    let x = along(covariate.name(), covariate.unit());
     let y = Axis::new(draft.carrier.name(), draft.carrier.unit()).from_zero();
     let known = || found.knots.iter().filter(|[.., error]| error.is_finite());
     let bars = known().map(|[at, value, error]| [*at, value - error, value + error]);
@@ -113,33 +121,43 @@ pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Op
         sheet.put([x, 12.0], &Label::new(*name).heading());
         let heat = HeatMap { values, rows, cols };
         sheet.put([x, 22.0], &Image { heat, cell_px, scale, title: (*name).into() });
+        sheet.put([x, 22.0], &ElementNumbers { heat, cell_px, scale });
     }
     let title = if noise_rms_counts.is_some() { "rms in units of the noise" } else { "rms in counts" };
     sheet.put([-12.0, height + 34.0], &ColourBar { scale, title: title.into() });
     sheet
 }
 
-/// Held-out residuals of the base model, of the grown model without each effect, and of the grown model; and the noise.
-pub fn levels(found: &Discovery) -> Sheet {
-    let mut bars =
-        vec![LevelBar::new(format!("{BEFORE}, recalibrated"), found.base.heldout_rms_counts, Ink::Red)];
-    if !found.steps.is_empty() {
-        bars.extend(found.steps.iter().map(|step| {
-            let name = format!("{AFTER} without {}", step.effect);
-            LevelBar::new(name, step.heldout_rms_before_counts, Ink::Amber)
-        }));
-        bars.push(LevelBar::new(AFTER, found.final_.level.heldout_rms_counts, Ink::Blue));
+/// Held-out residuals as the grown model is built up, from the base model; and the noise.
+pub fn staircase(found: &Discovery) -> Sheet {
+    let last = found.staircase.len().saturating_sub(1);
+    let stair = |(nth, stair): (usize, &Stair)| {
+        let ink = match nth {
+            0 => Ink::Red,
+            nth if nth == last => Ink::Blue,
+            _ => Ink::Amber,
+        };
+        let name = if nth == 0 { format!("{BEFORE}, recalibrated") } else { format!("with {}", stair.with) };
+        LevelBar::new(name, stair.heldout_rms_counts, ink)
+    };
+    let mut bars: Vec<LevelBar> = found.staircase.iter().enumerate().map(stair).collect();
+    if bars.is_empty() {
+        bars.push(LevelBar::new(BEFORE, found.base.heldout_rms_counts, Ink::Red));
     }
     bars.extend(found.floor.rms_counts().map(|rms| LevelBar::new("noise", rms, Ink::Muted)));
     let longest = bars.iter().map(|bar| bar.rms_counts).filter(|rms| rms.is_finite()).fold(0.0, f64::max);
-    let size_px = [BARS_PX[0] + BARS_PX[1] + 70.0, BAR_PX * bars.len() as f64];
+    let size_px = [BARS_PX[0] + BARS_PX[1] + 140.0, BAR_PX * bars.len() as f64];
     let mut sheet = Sheet::new("Held-out residual, rms in counts", size_px);
     for (nth, bar) in bars.into_iter().enumerate() {
         let length_px = if longest > 0.0 { BARS_PX[1] * bar.rms_counts / longest } else { 0.0 };
         let y = BAR_PX * (nth as f64 + 0.5);
         sheet.put([BARS_PX[0] - 12.0, y + 4.0], &Label::new(bar.name).right());
         sheet.put([BARS_PX[0], y], &HorizontalBar { length_px, ink: bar.ink });
-        let counts = digits(bar.rms_counts, 3);
+        let in_noise = found
+            .floor
+            .rms_counts()
+            .map(|noise| format!(", {} \u{d7} noise", digits(bar.rms_counts / noise, 3)));
+        let counts = format!("{}{}", digits(bar.rms_counts, 3), in_noise.unwrap_or_default());
         sheet.put([BARS_PX[0] + length_px.max(0.0) + 8.0, y + 4.0], &Label::new(counts));
     }
     sheet

@@ -2,13 +2,23 @@
 
 use std::fmt;
 
-use tactus_discover::Discovery;
+use tactus_discover::{Discovery, ElementGap, Gap};
 
 use super::{DiscoveryReport, element_maps, residual_against, words};
 use crate::{
     document::{Column, Table},
     numbers::{digits, probability},
 };
+
+/// Columns of a gap's table.
+const COLUMNS: [Column; 6] = [
+    Column::Name("the residual depends on"),
+    Column::Number("largest from"),
+    Column::Number("to"),
+    Column::Name(""),
+    Column::Number("size / noise"),
+    Column::Number("q"),
+];
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Result {
     let found = report.discovery;
@@ -35,11 +45,30 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
         writeln!(
             f,
             "<h3>The residual of each element</h3>\n<figure>\n{}\n<figcaption>Root mean square on held-out presses in {unit}, on one scale; the \
-             array from above, row 0 at the bottom.</figcaption>\n</figure>",
-            element_maps(report.array, &found.elements, found.floor.rms_counts())
+             array from above, row 0 at the bottom.{}</figcaption>\n</figure>",
+            element_maps(report.array, &found.elements, found.floor.rms_counts()),
+            brightest(found)
         )?;
     }
     writeln!(f, "</section>")
+}
+
+/// The elements with the largest residuals, before and after.
+fn brightest(found: &Discovery) -> String {
+    let noise = found.floor.rms_counts();
+    let most = |of: fn(&ElementGap) -> f64| {
+        let known = found.elements.iter().map(of).enumerate().filter(|(_, rms)| rms.is_finite());
+        known.max_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let Some((element, rms)) = most(|gap| gap.before_rms_counts) else { return String::new() };
+    let before = format!(" The largest is that of element {element}, {}", words::level(rms, noise));
+    match most(|gap| gap.after_rms_counts) {
+        Some((_, after)) if after.to_bits() == rms.to_bits() => format!("{before}."),
+        Some((other, after)) => {
+            format!("{before}; with the grown model that of element {other}, {}.", words::level(after, noise))
+        }
+        None => format!("{before}."),
+    }
 }
 
 fn table(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
@@ -59,22 +88,21 @@ fn table(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     if found.gap.is_empty() {
         return writeln!(f, "<p>The residual depends on no covariate examined.</p>");
     }
-    let mut table = Table::new(&[
-        Column::Name("the residual depends on"),
-        Column::Number("largest from"),
-        Column::Number("to"),
-        Column::Name(""),
-        Column::Number("size / noise"),
-        Column::Number("q"),
-    ]);
-    for gap in &found.gap {
+    writeln!(
+        f,
+        "{}\n<p class=\"lead\">Size: root mean square of the dependence in units of the noise of one reading. q: the false-discovery \
+         rate if all rows down to this one are accepted.</p>",
+        table_of(&found.gap)
+    )
+}
+
+/// On what a residual depends, and where it is largest.
+pub(super) fn table_of(gap: &[Gap]) -> Table<'static> {
+    let mut table = Table::new(&COLUMNS);
+    for gap in gap {
         let [from, to] = gap.range.map(|end| digits(end, 3));
         let size = digits(gap.effect_size, 3);
         table.row([gap.covariate, &from, &to, gap.unit, &size, &probability(gap.q_value)]);
     }
-    writeln!(
-        f,
-        "{table}\n<p class=\"lead\">Size: root mean square of the dependence in units of the noise of one reading. q: the false-discovery \
-         rate if all rows down to this one are accepted.</p>"
-    )
+    table
 }

@@ -7,15 +7,15 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tactus_discover::{
     AddedEffect, Contest, Curve, Discovery, DraftedEffect, Estimated, FaultyElement, FittedCurve, FittedKnot,
-    Floor, Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NoDraft, OpenQuestion, Rivalry, Round,
-    Structured, TriedEffect,
+    Floor, Gap, GivenUp, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NoDraft, OpenQuestion,
+    Rivalry, Round, Stair, Structured, TriedEffect,
 };
 use tactus_model::Covariate;
 use tactus_model::effect::{Draft, Law};
 use tactus_schema::draft::stage_name;
 
 use super::draft::status;
-use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
+use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, LabEffect, in_words};
 
 /// Name of the form of `report.json`.
 const SCHEMA: &str = "tactus.discovery/1";
@@ -41,6 +41,7 @@ struct ReportJson<'a> {
     notes: &'a [String],
     not_shown: Vec<NotShownJson<'a>>,
     warnings: &'a [String],
+    lab: Vec<LabEffectJson<'a>>,
     split: SplitJson<'a>,
     noise_rms_counts: Option<f64>,
     floor: FloorJson,
@@ -52,6 +53,8 @@ struct ReportJson<'a> {
     curves: Vec<CurveJson<'a>>,
     elements: Vec<ElementJson>,
     rounds: Vec<RoundJson<'a>>,
+    given_up: Vec<GivenUpJson<'a>>,
+    staircase: Vec<StairJson<'a>>,
     steps: Vec<StepJson<'a>>,
     tentative: Vec<StepJson<'a>>,
     inclusions: Vec<InclusionJson<'a>>,
@@ -82,6 +85,14 @@ struct SourceJson<'a> {
 struct NotShownJson<'a> {
     effect: &'a str,
     reason: &'a str,
+}
+
+/// An effect of the lab's own library that was tried.
+#[derive(Serialize)]
+struct LabEffectJson<'a> {
+    name: &'a str,
+    status: &'static str,
+    sha256: &'a str,
 }
 
 #[derive(Serialize)]
@@ -194,6 +205,18 @@ struct CandidateJson<'a> {
 }
 
 #[derive(Serialize)]
+struct GivenUpJson<'a> {
+    effect: &'a str,
+    because: String,
+}
+
+#[derive(Serialize)]
+struct StairJson<'a> {
+    with: &'a str,
+    heldout_rms_counts: f64,
+}
+
+#[derive(Serialize)]
 struct StepJson<'a> {
     effect: &'a str,
     parameters: BTreeMap<String, EstimateJson>,
@@ -274,6 +297,7 @@ struct EstimateJson {
 #[derive(Serialize)]
 struct UnexplainedJson<'a> {
     depends_on: &'a [&'static str],
+    gap: Vec<GapJson<'a>>,
     share: f64,
 }
 
@@ -373,6 +397,7 @@ impl<'a> ReportJson<'a> {
                 .map(|one| NotShownJson { effect: one.effect, reason: &one.reason })
                 .collect(),
             warnings: &found.warnings,
+            lab: report.lab.iter().map(LabEffectJson::of).collect(),
             split: SplitJson {
                 frames: found.split.frames,
                 train_presses: found.split.train_presses,
@@ -395,6 +420,8 @@ impl<'a> ReportJson<'a> {
                 })
                 .collect(),
             rounds: found.rounds.iter().map(RoundJson::of).collect(),
+            given_up: found.given_up.iter().map(GivenUpJson::of).collect(),
+            staircase: found.staircase.iter().map(StairJson::of).collect(),
             steps: found.steps.iter().map(StepJson::of).collect(),
             tentative: found.tentative.iter().map(StepJson::of).collect(),
             inclusions: found.inclusions.iter().map(InclusionJson::of).collect(),
@@ -407,6 +434,7 @@ impl<'a> ReportJson<'a> {
             verdict_text: in_words(found),
             unexplained: UnexplainedJson {
                 depends_on: &found.unexplained.depends_on,
+                gap: found.unexplained.gap.iter().map(GapJson::of).collect(),
                 share: found.unexplained.share,
             },
             draft: found.draft.as_ref().map(DraftJson::of),
@@ -537,6 +565,12 @@ impl GlobalTestJson {
     }
 }
 
+impl<'a> LabEffectJson<'a> {
+    fn of(LabEffect { name, status, sha256 }: &'a LabEffect) -> Self {
+        Self { name, status: status.name(), sha256 }
+    }
+}
+
 impl<'a> GapJson<'a> {
     fn of(gap: &'a Gap) -> Self {
         Self {
@@ -566,6 +600,18 @@ impl<'a> RoundJson<'a> {
             candidates: round.candidates.iter().map(CandidateJson::of).collect(),
             taken: round.taken,
         }
+    }
+}
+
+impl<'a> GivenUpJson<'a> {
+    fn of(one: &'a GivenUp) -> Self {
+        Self { effect: one.effect, because: one.in_words() }
+    }
+}
+
+impl<'a> StairJson<'a> {
+    fn of(stair: &'a Stair) -> Self {
+        Self { with: &stair.with, heldout_rms_counts: stair.heldout_rms_counts }
     }
 }
 

@@ -25,12 +25,30 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
          greatest odds on the fitted presses is taken. The figures of held-out presses are for the reader; they choose nothing.</p>"
     )?;
     for (nth, round) in found.rounds.iter().enumerate() {
-        self::round(f, nth + 1, round)?;
+        self::round(f, nth + 1, round, found)?;
     }
+    given_up(f, found)?;
     writeln!(f, "</section>")
 }
 
-fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round) -> fmt::Result {
+/// The effects that were fitted and are not in the model.
+fn given_up(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
+    if found.given_up.is_empty() {
+        return Ok(());
+    }
+    writeln!(f, "<h3>Given up</h3>\n<ul>")?;
+    for one in &found.given_up {
+        let tried = found.rounds.iter().flat_map(|round| &round.candidates);
+        let of_it = tried.filter(|tried| tried.effect == one.effect).filter_map(|tried| tried.shrink);
+        let closes = of_it.reduce(f64::max).map_or_else(String::new, |share| {
+            format!(", though it would close {} of the gap", percent(share))
+        });
+        writeln!(f, "<li>{}{closes}: {}.</li>", Text(one.effect), Text(one.in_words()))?;
+    }
+    writeln!(f, "</ul>")
+}
+
+fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round, found: &Discovery) -> fmt::Result {
     let with = if round.with.is_empty() {
         "the base model alone".into()
     } else {
@@ -45,16 +63,25 @@ fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round) -> fmt::Result {
             Column::Number("score"),
             Column::Number("p, corrected"),
             Column::Number("held out / counts rms"),
+            Column::Number("held out / noise"),
             Column::Number("gap closed"),
             Column::Name(""),
         ]);
         for candidate in fitted {
-            let taken = if round.taken == Some(candidate.effect) { "taken" } else { "" };
+            let is_kept = found.steps.iter().any(|step| step.effect == candidate.effect);
+            let taken = match (round.taken == Some(candidate.effect), is_kept) {
+                (true, true) => "taken",
+                (true, false) => "taken, given up later",
+                (false, _) => "",
+            };
+            let or_dash = |value: Option<f64>| value.map_or_else(|| "\u{2013}".into(), |rms| digits(rms, 3));
+            let rms = candidate.heldout_rms_counts;
             table.row([
                 candidate.effect,
                 &digits(candidate.score, 3),
                 &probability(candidate.p_value),
-                &candidate.heldout_rms_counts.map_or_else(|| "\u{2013}".into(), |rms| digits(rms, 3)),
+                &or_dash(rms),
+                &or_dash(rms.zip(found.floor.rms_counts()).map(|(rms, noise)| rms / noise)),
                 &candidate.shrink.map_or_else(|| "\u{2013}".into(), percent),
                 taken,
             ]);

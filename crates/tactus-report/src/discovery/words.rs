@@ -1,11 +1,14 @@
 //! The verdict of a discovery in words.
 
-use tactus_discover::{Discovery, Floor, Verdict};
+use tactus_discover::{Discovery, Floor, GivenUp, Verdict};
 
 use super::active::command;
 use super::faulty;
 use crate::numbers::{digits, short};
 use crate::plot::number;
+
+/// An effect that was given up and would close this share of the gap is told in the verdict.
+const CLOSES_MUCH: f64 = 0.5;
 
 /// What the fitted presses show, but do not confirm where they are predicted by each other.
 fn tentative(found: &Discovery) -> Option<String> {
@@ -62,8 +65,9 @@ pub fn in_words(found: &Discovery) -> String {
         ),
         Verdict::Unexplained => format!(
             "The model is missing something that no known effect matches: on held-out presses its residual is {before} counts rms and \
-             {noise_is}.{bound} {}",
-            left(found)
+             {noise_is}.{bound} {}{}",
+            left(found),
+            nearest(found)
         ),
     };
     [verdict].into_iter().chain(tentative(found)).chain(faulty::in_words(found)).collect::<Vec<_>>().join(" ")
@@ -114,6 +118,26 @@ fn left(found: &Discovery) -> String {
     }
 }
 
+/// The effect that was given up although it would close most of the gap, if one would close much.
+fn nearest(found: &Discovery) -> String {
+    let closes = |one: &GivenUp| {
+        let tried = found.rounds.iter().flat_map(|round| &round.candidates);
+        tried.filter(|tried| tried.effect == one.effect).filter_map(|tried| tried.shrink).reduce(f64::max)
+    };
+    let known = found.given_up.iter().filter_map(|one| Some((one, closes(one)?)));
+    known.filter(|(_, share)| *share >= CLOSES_MUCH).max_by(|a, b| a.1.total_cmp(&b.1)).map_or_else(
+        String::new,
+        |(one, share)| {
+            format!(
+                " {} would close {} of it, but is not named: {}.",
+                one.effect,
+                percent(share),
+                one.in_words()
+            )
+        },
+    )
+}
+
 /// `a`, `a and b`, `a, b and c`.
 pub(super) fn list<T: AsRef<str>>(names: impl IntoIterator<Item = T>) -> String {
     let names: Vec<T> = names.into_iter().collect();
@@ -133,6 +157,13 @@ pub(super) fn list<T: AsRef<str>>(names: impl IntoIterator<Item = T>) -> String 
 pub(super) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     format!("{} %", short(percent, usize::from((percent - 100.0).abs() < 2.0 || percent.abs() < 2.0)))
+}
+
+/// A residual in counts and in units of the noise.
+pub(super) fn level(rms_counts: f64, noise_counts: Option<f64>) -> String {
+    let in_noise = noise_counts
+        .map_or_else(String::new, |noise| format!(", {} times the noise", digits(rms_counts / noise, 3)));
+    format!("{} counts rms{in_noise}", digits(rms_counts, 3))
 }
 
 /// A probability within a sentence.

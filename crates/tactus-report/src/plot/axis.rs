@@ -1,5 +1,8 @@
 //! An axis: quantity, range and ticks.
 
+/// A logarithmic axis of fewer decades has ticks between the powers of ten.
+const TICKS_BETWEEN_BELOW: f64 = 3.0;
+
 /// Quantity, unit and range of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
@@ -8,12 +11,20 @@ pub struct Axis {
     range: Option<[f64; 2]>,
     from_zero: bool,
     tight: bool,
+    logarithmic: bool,
 }
 
 impl Axis {
     /// An axis of a quantity in a unit (empty for a pure number); its range follows the data.
     pub fn new(quantity: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self { quantity: quantity.into(), unit: unit.into(), range: None, from_zero: false, tight: false }
+        Self {
+            quantity: quantity.into(),
+            unit: unit.into(),
+            range: None,
+            from_zero: false,
+            tight: false,
+            logarithmic: false,
+        }
     }
 
     /// With exactly this range.
@@ -37,6 +48,13 @@ impl Axis {
         self
     }
 
+    /// Logarithmic, if all data are positive and span a factor of ten; else as it is.
+    #[must_use]
+    pub fn logarithmic(mut self) -> Self {
+        self.logarithmic = true;
+        self
+    }
+
     /// `quantity / unit`.
     pub(super) fn title(&self) -> String {
         if self.unit.is_empty() {
@@ -53,6 +71,12 @@ impl Axis {
             let [lo, hi] = range.unwrap_or([value, value]);
             Some([lo.min(value), hi.max(value)])
         });
+        if let Some([least, most]) = found.filter(|_| self.logarithmic)
+            && least > 0.0
+            && most >= 10.0 * least
+        {
+            return AxisScale::logarithmic([least, most]);
+        }
         match self.range {
             Some(range) => AxisScale::within(range, ticks),
             None if self.tight => AxisScale::within(found.unwrap_or([0.0, 1.0]), ticks),
@@ -67,6 +91,7 @@ pub(super) struct AxisScale {
     pub(super) range: [f64; 2],
     pub(super) ticks: Vec<f64>,
     decimals: usize,
+    is_logarithmic: bool,
 }
 
 impl AxisScale {
@@ -76,7 +101,24 @@ impl AxisScale {
         let step = round_step((hi - lo) / ticks);
         let slack = 1e-9 * (hi - lo);
         let (first, last) = (((lo - slack) / step).ceil(), ((hi + slack) / step).floor());
-        Self { range: [lo, hi], ticks: multiples(first, last, step), decimals: decimals(step) }
+        Self {
+            range: [lo, hi],
+            ticks: multiples(first, last, step),
+            decimals: decimals(step),
+            is_logarithmic: false,
+        }
+    }
+
+    /// Ticks at powers of ten inside a range of positive values, and at twice and five times them if these are few.
+    #[expect(clippy::cast_possible_truncation, reason = "powers of ten of a finite number")]
+    fn logarithmic([least, most]: [f64; 2]) -> Self {
+        let slack = 1.0 + 1e-9;
+        let powers = (least.log10().floor() as i32)..=(most.log10().ceil() as i32);
+        let few = (most / least).log10() < TICKS_BETWEEN_BELOW;
+        let digits: &[f64] = if few { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let all = powers.flat_map(|power| digits.iter().map(move |digit| digit * 10_f64.powi(power)));
+        let ticks = all.filter(|tick| *tick >= least / slack && *tick <= most * slack).collect();
+        Self { range: [least, most], ticks, decimals: 0, is_logarithmic: true }
     }
 
     /// A range that begins and ends at a tick.
@@ -89,12 +131,16 @@ impl AxisScale {
             range: [first * step, last * step],
             ticks: multiples(first, last, step),
             decimals: decimals(step),
+            is_logarithmic: false,
         }
     }
 
     /// Position of a value: 0 at the range's start, 1 at its end.
     pub(super) fn share(&self, value: f64) -> f64 {
         let [lo, hi] = self.range;
+        if self.is_logarithmic {
+            return (value / lo).log10() / (hi / lo).log10();
+        }
         (value - lo) / (hi - lo)
     }
 
@@ -107,7 +153,7 @@ impl AxisScale {
 
     /// A tick's text, with the decimals that the step needs.
     pub(super) fn label(&self, tick: f64) -> String {
-        number(tick, self.decimals)
+        number(tick, if self.is_logarithmic { decimals(tick) } else { self.decimals })
     }
 }
 

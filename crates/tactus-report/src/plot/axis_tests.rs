@@ -66,3 +66,23 @@ fn numbers_read_well() {
     assert_eq!(number(1_234_567.25, 2), "1\u{202f}234\u{202f}567.25");
     assert_eq!(number(f64::NAN, 1), "\u{2013}");
 }
+
+#[test]
+fn a_logarithmic_axis_has_its_ticks_at_round_numbers() {
+    let axis = Axis::new("time since contact", "s").logarithmic();
+    assert_eq!(ticks(&axis, &[0.04, 3.0]), ["0.05", "0.1", "0.2", "0.5", "1", "2"]);
+    assert_eq!(ticks(&axis, &[0.01, 100.0]), ["0.01", "0.1", "1", "10", "100"]);
+    let scale = axis.scale([0.01, 100.0].into_iter(), 6.0);
+    assert!((scale.share(1.0) - 0.5).abs() < 1e-12);
+    assert!((scale.share(10.0) - 0.75).abs() < 1e-12);
+}
+
+#[test]
+fn what_has_no_logarithm_or_hardly_varies_is_drawn_on_a_plain_axis() {
+    let axis = Axis::new("time", "s").logarithmic();
+    for data in [[0.0, 100.0], [-1.0, 100.0], [20.0, 100.0]] {
+        let scale = axis.scale(data.into_iter(), 6.0);
+        let middle = f64::midpoint(scale.range[0], scale.range[1]);
+        assert!((scale.share(middle) - 0.5).abs() < 1e-12, "{data:?}");
+    }
+}

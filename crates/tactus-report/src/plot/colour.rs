@@ -56,6 +56,11 @@ impl Scale {
     }
 }
 
+/// True if black shows better than white on the colour with an index: the map's lightness rises evenly from 15 to 91 of 100.
+pub(super) fn is_bright(level: u8) -> bool {
+    level >= LEVELS / 2
+}
+
 /// The colour with an index as `#rrggbb`.
 pub(super) fn colour(level: u8) -> String {
     let [r, g, b] = rgb(level);

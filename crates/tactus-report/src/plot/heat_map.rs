@@ -2,8 +2,12 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use super::{Panel, Scale, colour::colour};
+use super::colour::{colour, is_bright};
+use super::{Panel, Scale};
 use crate::markup::Text;
+
+/// Squares that are smaller have no numbers.
+const NUMBERED_PX: f64 = 22.0;
 
 /// One value for each of `rows x cols` elements, row-major. Row 0 is drawn at the bottom, because y points up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +31,17 @@ pub struct Image<'a> {
     pub scale: Scale,
     /// Tooltip.
     pub title: String,
+}
+
+/// The number of each element on an [`Image`] with the same origin, in a colour that its square lets show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ElementNumbers<'a> {
+    /// The image's values.
+    pub heat: HeatMap<'a>,
+    /// Side of an element's square; of small squares nothing is drawn.
+    pub cell_px: f64,
+    /// The image's colour scale.
+    pub scale: Scale,
 }
 
 /// A heat map at a position in a [`Mosaic`].
@@ -63,6 +78,29 @@ impl Panel for Image<'_> {
         write!(f, r#"<g class="cells" transform="scale({cell_px})"><title>{}</title>"#, Text(title))?;
         heat.write(f, *scale)?;
         f.write_str("</g>")
+    }
+}
+
+impl Panel for ElementNumbers<'_> {
+    fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { heat, cell_px, scale } = self;
+        if *cell_px < NUMBERED_PX {
+            return Ok(());
+        }
+        for (element, value) in heat.values.iter().enumerate().take(heat.rows * heat.cols) {
+            let x = cell_px * (0.5 + (element % heat.cols) as f64);
+            let y = cell_px * (0.5 + (heat.rows - 1 - element / heat.cols) as f64) + 4.0;
+            let class = match scale.level(f64::from(*value)) {
+                Some(level) if is_bright(level) => "on-bright",
+                Some(_) => "on-dark",
+                None => "note",
+            };
+            write!(
+                f,
+                r#"<text class="{class}" text-anchor="middle" x="{x:.1}" y="{y:.1}">{element}</text>"#
+            )?;
+        }
+        Ok(())
     }
 }
 

@@ -15,10 +15,12 @@ use tactus_discover::{
     RefutedFormula, Unexplained, Verdict,
 };
 use tactus_model::Array;
+use tactus_model::effect::Definition;
 use tactus_report::discovery::{
-    ActiveRun, AmbiguousEffect, DiscoveryReport, discovery_html, discovery_json, element_maps, in_words,
-    levels, not_proposed, not_shown, proposals, residual_against,
+    ActiveRun, AmbiguousEffect, DiscoveryReport, LabEffect, discovery_html, discovery_json, element_maps,
+    in_words, not_proposed, not_shown, proposals, residual_against, staircase,
 };
+use tactus_schema::draft::DraftStatus;
 
 const HOSTILE: &str = "<img src=x onerror='alert(\"1\")'>";
 
@@ -205,10 +207,13 @@ fn the_json_keeps_its_form_to_the_byte() {
     }];
     let (array, data, notes) = (Array::digitacts(), data(), ["one note".to_owned()]);
     let settled = ["draft-1 is confirmed".to_owned()];
+    let lab =
+        [LabEffect { name: "grounding".into(), status: DraftStatus::Confirmed, sha256: "5a".repeat(32) }];
     let report = DiscoveryReport {
         notes: &notes,
         active: &active,
         settled: &settled,
+        lab: &lab,
         ..report(&array, &data, &discovery)
     };
     let text = discovery_json(&report);
@@ -269,7 +274,8 @@ fn the_verdict_says_what_it_rests_on() {
         in_words(&unexplained()),
         "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms and the noise \
          is 2.00 counts, from repeats of a place. Of readings with a signal, 4.6 times the noise (9.1 counts) is not noise; with 95 % \
-         confidence it is at most 5.7 times the noise (11 counts). The remaining 100 % of the gap depends on time since contact and depth."
+         confidence it is at most 5.7 times the noise (11 counts). The remaining 100 % of the gap depends on time since contact and depth. \
+         hysteresis would close 82 % of it, but is not named: a dependence on place along x that is no effect explains more."
     );
     assert_eq!(
         in_words(&cannot_judge()),
@@ -279,7 +285,7 @@ fn the_verdict_says_what_it_rests_on() {
     );
     let partly = Discovery {
         verdict: Verdict::PartlyExplained,
-        unexplained: Unexplained { depends_on: vec!["temperature"], share: 0.3 },
+        unexplained: Unexplained { depends_on: vec!["temperature"], gap: vec![], share: 0.3 },
         ..explained()
     };
     assert!(in_words(&partly).ends_with("The remaining 30 % of the gap depends on temperature."));
@@ -343,8 +349,12 @@ fn what_cannot_be_shown_comes_first_and_what_it_rests_on_last() {
         "Where the gap is",
         "The residual against each covariate",
         "The residual of each element",
+        "The largest is that of element 47, 15.8 counts rms, 7.88 times the noise; with the grown model that of element 47, 2.47 counts rms, 1.24 times the noise.",
         "What was tried",
-        "Round 3: the model has misregistration, hysteresis and miswired",
+        "taken, given up later",
+        "Round 4: the model has misregistration, hysteresis and miswired",
+        "<h3>Given up</h3>",
+        "<li>gain-drift, though it would close 61 % of the gap: hysteresis explains more in its place.</li>",
         "What was added",
         "The gap before and after",
         "What stays unexplained",
@@ -493,11 +503,10 @@ fn figures_draw_what_was_found() {
     ];
     assert!([&curve, &map].iter().all(|figure| figure.contains("base") && !figure.contains("grown")));
     assert!(element_maps(&Array::digitacts(), &found.elements, None).to_string().contains("rms in counts"));
-    let levels = levels(&found).to_string();
-    for name in
-        ["base model", "without hysteresis", "without miswired", "grown model<", "noise", "9.36", "2.08"]
+    let stairs = staircase(&found).to_string();
+    for name in ["base model", "with hysteresis", "with miswired", "noise", "9.36, 4.68 \u{d7} noise", "2.08"]
     {
-        assert!(levels.contains(name), "{name}");
+        assert!(stairs.contains(name), "{name}");
     }
 }
 
@@ -558,4 +567,29 @@ fn a_page_tells_why_no_further_experiment_was_run() {
     assert!(discovery_html(&report).contains("<p>the budget is &lt;spent&gt;</p>"));
     let json: Value = serde_json::from_str(&discovery_json(&report)).unwrap();
     assert_eq!(json["active_ended"], "the budget is <spent>");
+}
+
+#[test]
+fn a_parameter_at_the_end_of_its_range_or_within_its_error_is_flagged() {
+    let mut discovery = explained();
+    let [loss_share, threshold_mm] = &mut discovery.steps[0].terms[0][..] else { panic!("two parameters") };
+    let range = Definition::find("hysteresis").unwrap().parameters[0].range;
+    loss_share.value = range[1];
+    (threshold_mm.value, threshold_mm.standard_error) = (0.03, Some(0.04));
+    let html = html(&discovery);
+    for text in [
+        "loss_share is at the end of its range: the true value may lie beyond.",
+        "threshold_mm has a standard error greater than its value: these data hardly determine it.",
+    ] {
+        assert!(html.contains(text), "{text}");
+    }
+    assert!(!self::html(&explained()).contains("end of its range"));
+}
+
+#[test]
+fn the_effects_of_the_lab_are_told_with_their_version() {
+    let (array, data, found) = (Array::digitacts(), data(), nothing_missing());
+    let lab = [LabEffect { name: "grounding".into(), status: DraftStatus::Drafted, sha256: "5a5a".into() }];
+    let html = discovery_html(&DiscoveryReport { lab: &lab, ..report(&array, &data, &found) });
+    assert!(html.contains("effect of the lab") && html.contains("grounding") && html.contains("5a5a"));
 }

@@ -18,13 +18,12 @@ use tactus_discover::{DiscoverError, Discovery, Known, Options, Rule};
 use tactus_model::Array;
 use tactus_model::effect::Definition;
 use tactus_report::discovery::{
-    ActiveRun, DataSource, DiscoveryReport, discovery_html, discovery_json, draft_status,
+    ActiveRun, DataSource, DiscoveryReport, LabEffect, discovery_html, discovery_json, draft_status,
 };
 use tactus_schema::draft::{DraftEvidence, DraftFile, DraftStatus, Nearest};
 use tactus_schema::{Model, Rig};
 
 use crate::cli::{Ablation, Common, DiscoverArgs};
-use crate::commands::library;
 use crate::exit::{Exit, Failure};
 use crate::output;
 use crate::progress::ComputationProgress;
@@ -42,6 +41,8 @@ struct Discovered {
     model: Model,
     known: Known,
     discovery: Discovery,
+    /// The lab's own effects that were tried.
+    lab: Vec<LabEffect>,
     /// Experiments that `--active` ran.
     active: Vec<ActiveRun>,
     /// Why `--active` ran no further experiment, although there was a round for it.
@@ -67,16 +68,18 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     let progress = ComputationProgress::new(common.json);
     let declared = args.model.as_deref().map(declared).transpose()?;
     let folder = UnfinishedFolder::create(&args.out)?;
-    let library = args.library.as_deref().map(library::in_use).transpose()?.unwrap_or_default();
+    let (lab, library): (Vec<LabEffect>, Vec<&'static Definition>) =
+        args.library.in_use()?.into_iter().unzip();
     let analyse = |files: &[PathBuf], live: Option<&LiveRig>, drafts: &[&'static Definition]| {
         let drafts = [&library, drafts].concat();
         analysed(args, declared.clone(), files, live, &drafts, &progress)
     };
-    let discovered = if args.active {
+    let mut discovered = if args.active {
         active::discover(common, args, &progress, analyse)?
     } else {
         analyse(&args.files, None, &[])?
     };
+    discovered.lab = lab;
     progress.show("writing", 1.0);
     discovered.write(folder.path())?;
     folder.finish()?;
@@ -136,6 +139,7 @@ fn analysed(
     })?;
     discovery.warnings.extend(measured.renamed.clone());
     Ok(Discovered {
+        lab: Vec::new(),
         measured,
         model,
         known,
@@ -209,6 +213,7 @@ impl Discovered {
             active: &self.active,
             active_ended: self.active_ended.as_deref(),
             settled: &self.settled_in_words,
+            lab: &self.lab,
             discovery: &self.discovery,
         }
     }

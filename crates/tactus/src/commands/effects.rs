@@ -1,6 +1,4 @@
-//! `effects`: lists the effects of the library and the drafts of a folder, and shows, renames and retires drafts.
-
-use std::path::Path;
+//! `effects`: lists the effects of the library and the lab's own; shows, adds, renames and retires those of the lab.
 
 use anyhow::Context;
 use serde_json::{Value, json};
@@ -9,16 +7,21 @@ use tactus_schema::DraftFile;
 use tactus_schema::draft::{DraftStatus, stage_name};
 
 use crate::cli::{Common, EffectsArgs, EffectsCommand};
-use crate::commands::library::{self, Held};
+use crate::commands::library::Held;
 use crate::exit::{Exit, Failure};
 use crate::output::{print_fields, print_table, say};
 
 pub(crate) fn effects(common: &Common, args: &EffectsArgs) -> anyhow::Result<Exit> {
-    let held = args.library.as_deref().map(library::read).transpose()?.unwrap_or_default();
+    let held = args.library.read()?;
     match &args.command {
         None | Some(EffectsCommand::List) => list(common, &held),
         Some(EffectsCommand::Show { name }) => show(common, &held, name)?,
-        Some(EffectsCommand::Rename { name, to }) => rename(args.library.as_deref(), held, name, to)?,
+        Some(EffectsCommand::Add { file }) => {
+            let added = args.library.add(file)?;
+            let name = &added.draft.draft.name;
+            say(&format!("{}: every discovery tries {name} from now on", added.path.display()));
+        }
+        Some(EffectsCommand::Rename { name, to }) => rename(held, name, to)?,
         Some(EffectsCommand::Retire { name }) => {
             let mut one = find(held, name)?;
             one.draft.status = DraftStatus::Retired;
@@ -124,14 +127,14 @@ fn law(draft: &Draft) -> String {
     format!("{}: {}", draft.law.name(), numbers.collect::<Vec<_>>().join(", "))
 }
 
-fn rename(folder: Option<&Path>, held: Vec<Held>, name: &str, to: &str) -> anyhow::Result<()> {
+fn rename(held: Vec<Held>, name: &str, to: &str) -> anyhow::Result<()> {
     if held.iter().any(|one| one.draft.draft.name == to) {
         return Err(Failure::new(Exit::Usage, format!("there is a draft {to:?} already")).into());
     }
     let Held { path: old, mut draft } = find(held, name)?;
     to.clone_into(&mut draft.draft.name);
     draft.draft.check().map_err(|error| Failure::new(Exit::Usage, error))?;
-    let path = folder.unwrap_or(Path::new("")).join(format!("{to}.toml"));
+    let path = old.with_file_name(format!("{to}.toml"));
     if path.exists() && path != old {
         return Err(Failure::new(Exit::Usage, format!("{} is there already", path.display())).into());
     }
@@ -148,8 +151,12 @@ fn rename(folder: Option<&Path>, held: Vec<Held>, name: &str, to: &str) -> anyho
 fn find(held: Vec<Held>, name: &str) -> anyhow::Result<Held> {
     let names: Vec<String> = held.iter().map(|one| one.draft.draft.name.clone()).collect();
     let found = held.into_iter().find(|one| one.draft.draft.name == name);
-    let there =
-        if names.is_empty() { "none; name their folder with --library".to_owned() } else { names.join(", ") };
+    let there = if names.is_empty() {
+        "none; `tactus effects add FILE` puts one into the library, and --library names another folder"
+            .to_owned()
+    } else {
+        names.join(", ")
+    };
     Ok(found.ok_or_else(|| Failure::new(Exit::Usage, format!("no draft {name:?}; there is: {there}")))?)
 }
 

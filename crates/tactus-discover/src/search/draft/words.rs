@@ -7,11 +7,11 @@ use super::grammar::Atom;
 use super::sight::Sight;
 
 /// The draft of an atom with this law.
-pub(super) fn named(sight: &Sight, atom: &Atom, law: Law, number: usize) -> Draft {
+pub(super) fn named(sight: &Sight, atom: &Atom, law: Law, name: &str) -> Draft {
     let ranges: Vec<[f64; 2]> =
         atom.covariates.iter().map(|covariate| sight.range(*covariate, atom.when)).collect();
     let mut draft = Draft {
-        name: format!("draft-{number}"),
+        name: name.to_owned(),
         sentence: String::new(),
         carrier: atom.carrier,
         when: atom.when,

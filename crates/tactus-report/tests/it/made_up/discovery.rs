@@ -1,9 +1,10 @@
 //! Synthetic discoveries with known numbers.
 
 use tactus_discover::{
-    AddedEffect, BaseModel, Contest, Curve, Discovery, DraftedEffect, ElementGap, Estimated, FaultKind,
-    FaultyElement, Final, Floor, Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NotShown,
-    OpenQuestion, Plan, Point, Rivalry, Round, Split, Structured, TriedEffect, Unexplained, Verdict,
+    AddedEffect, BaseModel, Because, Contest, Curve, Discovery, DraftedEffect, ElementGap, Estimated,
+    FaultKind, FaultyElement, Final, Floor, Gap, GivenUp, GlobalTest, Inclusion, LeftOut, Level,
+    NextExperiment, NotShown, OpenQuestion, Plan, Point, Rivalry, Round, Split, Stair, Structured,
+    TriedEffect, Unexplained, Verdict,
 };
 use tactus_model::effect::{Carrier, Draft, Law, When};
 use tactus_model::{Array, Covariate, Covering, Effect, Indenter, Psf, Response};
@@ -92,6 +93,10 @@ pub(crate) fn explained() -> Discovery {
             })
             .collect(),
         rounds: rounds(),
+        given_up: vec![GivenUp { effect: "gain-drift", because: Because::Other("hysteresis") }],
+        staircase: [("base model", 9.36), ("misregistration", 9.2), ("hysteresis", 4.31), ("miswired", 2.08)]
+            .map(|(with, heldout_rms_counts)| Stair { with: with.into(), heldout_rms_counts })
+            .to_vec(),
         tentative: vec![],
         inclusions: inclusions(),
         contests: contests(),
@@ -134,7 +139,7 @@ pub(crate) fn explained() -> Discovery {
         final_: Final { level: level(2.08), shrink: Some(0.996_1) },
         verdict: Verdict::Explained,
         draft: None,
-        unexplained: Unexplained { depends_on: vec![], share: 0.003_9 },
+        unexplained: Unexplained { depends_on: vec![], gap: vec![], share: 0.003_9 },
         plan: plan(),
         recalibrated: base(),
         grown: base(),
@@ -207,7 +212,9 @@ pub(crate) fn nothing_missing() -> Discovery {
         contests: vec![],
         final_: Final { level: level(2.01), shrink: None },
         verdict: Verdict::NothingMissing,
-        unexplained: Unexplained { depends_on: vec![], share: 0.0 },
+        given_up: vec![],
+        staircase: vec![Stair { with: "base model".into(), heldout_rms_counts: 2.02 }],
+        unexplained: Unexplained { depends_on: vec![], gap: vec![], share: 0.0 },
         plan: Plan::default(),
         effects: vec![],
         ..whole
@@ -252,7 +259,13 @@ pub(crate) fn unexplained() -> Discovery {
         inclusions: vec![],
         contests: vec![],
         verdict: Verdict::Unexplained,
-        unexplained: Unexplained { depends_on: vec!["time since contact", "depth"], share: 1.0 },
+        given_up: vec![GivenUp { effect: "hysteresis", because: Because::Rival("place along x") }],
+        staircase: vec![Stair { with: "base model".into(), heldout_rms_counts: 9.36 }],
+        unexplained: Unexplained {
+            depends_on: vec!["time since contact", "depth"],
+            gap: whole.gap.clone(),
+            share: 1.0,
+        },
         plan: Plan::default(),
         effects: vec![],
         ..whole
@@ -268,7 +281,8 @@ pub(crate) fn cannot_judge() -> Discovery {
         base: level,
         final_: Final { level, shrink: None },
         verdict: Verdict::CannotJudge,
-        unexplained: Unexplained { depends_on: vec![], share: 1.0 },
+        staircase: vec![],
+        unexplained: Unexplained { depends_on: vec![], gap: vec![], share: 1.0 },
         curves: vec![],
         plan: Plan {
             next: vec![NextExperiment {
@@ -329,6 +343,7 @@ pub(crate) fn report<'a>(
         active: &[],
         active_ended: None,
         settled: &[],
+        lab: &[],
         discovery,
     }
 }
@@ -344,6 +359,11 @@ fn rounds() -> Vec<Round> {
                 tried("crosstalk", 1.1, 1.0, None),
             ],
             taken: Some("hysteresis"),
+        },
+        Round {
+            with: vec!["misregistration"],
+            candidates: vec![tried("gain-drift", 30.1, 0.000_5, Some((6.0, 0.61)))],
+            taken: Some("gain-drift"),
         },
         Round {
             with: vec!["misregistration", "hysteresis"],

@@ -1,0 +1,54 @@
+//! Effects that were fitted and are not in the grown model, and why.
+
+/// An effect that was fitted, and that the grown model does not have.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GivenUp {
+    /// Its name.
+    pub effect: &'static str,
+    /// Why.
+    pub because: Because,
+}
+
+/// Why an effect was given up.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Because {
+    /// A rival without a name explains more in its place: on what the rival depends.
+    Rival(&'static str),
+    /// A rival without a name would take over much of it, and explains more beside it: it is only the nearest form of that.
+    NearestForm(&'static str),
+    /// It explains too little, or so little beside another effect that it may be an error of that one's form.
+    Little,
+    /// Another effect explains more in its place.
+    Other(&'static str),
+    /// Presses that the fit has not seen do not confirm it.
+    Unconfirmed,
+}
+
+impl GivenUp {
+    /// The reason as a clause, such as `a dependence on depth without a name explains more`.
+    pub fn in_words(&self) -> String {
+        match self.because {
+            Because::Rival(rival) => format!("a dependence on {rival} that is no effect explains more"),
+            Because::NearestForm(rival) => {
+                format!(
+                    "a dependence on {rival} that is no effect would take over much of it, and explains more beside it"
+                )
+            }
+            Because::Little => "it explains too little by itself or beside the others".into(),
+            Because::Other(other) => format!("{other} explains more in its place"),
+            Because::Unconfirmed => "presses that its fit has not seen do not confirm it".into(),
+        }
+    }
+}
+
+/// The last word on each effect that a model with these effects does not have, in the order in which they were given up.
+pub(crate) fn last_words(all: Vec<GivenUp>, present: &[&str]) -> Vec<GivenUp> {
+    let mut last: Vec<GivenUp> = Vec::new();
+    for one in all {
+        last.retain(|known| known.effect != one.effect);
+        if !present.contains(&one.effect) {
+            last.push(one);
+        }
+    }
+    last
+}

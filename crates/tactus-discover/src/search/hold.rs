@@ -1,0 +1,192 @@
+//! Each class of a grown model has to hold its place: against the model without it, against rivals without a name, and against every other
+//! class, each in its place. Classes that the data cannot tell apart in one place are reported as one set.
+
+use super::contests::Contest;
+use super::evidence::Set;
+use super::given_up::{Because, GivenUp};
+use super::grow::{
+    ALPHA, Alike, Beside, FORM_SHARE, Grown, LN_ODDS_LEAST, POLISH_ROUNDS, PROMISE_SHARE, SHARE_AFTER_HOLD,
+    Search, TRIAL_ROUNDS, is_exact, names, without,
+};
+use super::pass::{Pass, rivals_win};
+use super::varying::varying_effect;
+use crate::data::DiscoverError;
+use crate::fit::{Fitted, Parameters, Term};
+use crate::numbers::parallel;
+
+/// Another class takes the place of one if its odds are greater by this logarithm.
+const BETTER_LN_ODDS: f64 = 3.0;
+const EXCHANGES_MAX: usize = 4;
+/// Greatest number of other classes that are fitted in a class's place.
+const OTHERS_MAX: usize = 4;
+/// A class must gain so many standard errors, from the scatter of blocks.
+const BLOCKS_Z: f64 = 2.0;
+/// Probability of a reported set of classes, and by how many units one at its end is behind the best.
+const SET_PROBABILITY: f64 = 0.95;
+const SET_UNITS: f64 = 3.0;
+/// Estimated share of a discovery that is done before the classes have to hold their places.
+const SHARE_BEFORE_HOLD: f64 = 0.65;
+
+impl Search<'_> {
+    /// Lets each class hold its place: against the model without it, rivals without a name, and other classes.
+    pub(super) fn hold(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
+        let mut exchanges_left = EXCHANGES_MAX;
+        'again: loop {
+            // Whether the model leaves something, once that is asked.
+            let mut leaves: Option<bool> = None;
+            grown.equivalent.clear();
+            let names = names(&grown.at.parameters, self.known_terms);
+            let without = |name: &&'static str| {
+                (self.progress)(&format!("without {name}"), SHARE_BEFORE_HOLD);
+                let less = without(&grown.at.parameters, name, self.known_terms);
+                self.fitted(grown, less, TRIAL_ROUNDS)
+            };
+            let lesses: Vec<Fitted> =
+                parallel::map(&names, without).into_iter().collect::<Result<_, DiscoverError>>()?;
+            let odds: Vec<f64> = lesses.iter().map(|less| self.ln_odds(less, &grown.at)).collect();
+            let worth = |(index, less): (usize, &Fitted)| self.worth(&grown.at, less, index, &names, &odds);
+            let worths: Vec<f64> = lesses.iter().enumerate().map(worth).collect();
+            let weakest = worths.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
+            if let Some((weakest, _)) = weakest.filter(|(_, worth)| **worth < 1.0) {
+                grown.refused.push(self.too_small(names[weakest], odds[weakest], &grown.at));
+                grown.at = self.fitted(grown, lesses[weakest].parameters.clone(), POLISH_ROUNDS)?;
+                continue 'again;
+            }
+            for (nth, ((name, less), ln_odds)) in names.iter().zip(lesses).zip(odds.clone()).enumerate() {
+                let share = nth as f64 / names.len() as f64;
+                (self.progress)(
+                    &format!("comparing {name} with others in its place"),
+                    SHARE_BEFORE_HOLD + share * (SHARE_AFTER_HOLD - SHARE_BEFORE_HOLD),
+                );
+                let pass = self.pass(&less)?;
+                let (strength, mut rivals) = pass.rivalry(name, ln_odds);
+                let odds_of = |effect| names.iter().zip(&odds).find(|(name, _)| **name == effect);
+                let is_stronger = |effect| odds_of(effect).is_some_and(|(_, odds)| *odds > ln_odds);
+                rivals.retain(|(rival, _)| varying_effect(rival).is_none_or(is_stronger));
+                let unit = self.unit(ln_odds, &grown.at);
+                if rivals_win(&rivals, strength) {
+                    grown.refused.push(Contest::lost(name, ln_odds, self.left_over(&grown.at), rivals));
+                    grown.barred.push((self.sorted_names(&less), name));
+                    grown.at = self.fitted(grown, less.parameters, POLISH_ROUNDS)?;
+                    continue 'again;
+                }
+                if is_exact(name) {
+                    // No other effect acts like miswired elements.
+                    continue;
+                }
+                let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
+                let likeliest = others.iter().max_by(|a, b| self.rank(a).total_cmp(&self.rank(b)));
+                let present = self.rank_of(name, ln_odds, &grown.at);
+                let better =
+                    likeliest.filter(|best| self.rank(best) > present + BETTER_LN_ODDS && exchanges_left > 0);
+                if let Some(better) = better {
+                    exchanges_left -= 1;
+                    grown.exchanged.push(GivenUp { effect: name, because: Because::Other(better.name) });
+                    grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
+                    continue 'again;
+                }
+                let classes = others.iter().map(|other| (other.name, other.ln_odds)).collect();
+                let model_leaves = match leaves {
+                    Some(known) => known,
+                    None if others.is_empty() => true,
+                    None => *leaves.insert(self.leaves_something(&grown.at)?),
+                };
+                // Where the model leaves nothing, its form is right, and only the other class needs another form than its own.
+                let form_odds = if model_leaves { 1.0 } else { unit.sqrt() };
+                let probabilities = probabilities(name, ln_odds, unit, form_odds, &others);
+                let mut same = Vec::new();
+                for (other, fitted) in credible(&probabilities, others) {
+                    // Its form is no excuse for a class that leaves something where the model leaves nothing.
+                    if model_leaves || !self.leaves_something(&fitted)? {
+                        same.push((other, fitted));
+                    }
+                }
+                grown.equivalent.insert(name, Alike { without: less, same, probabilities, rivals, classes });
+            }
+            return Ok(());
+        }
+    }
+
+    /// A model fitted from these values, or the one that the rounds passed.
+    fn fitted(&self, grown: &Grown, from: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
+        match grown.passed(&from) {
+            Some(passed) => Ok(passed.clone()),
+            None => self.problem.fit_from(from, rounds),
+        }
+    }
+
+    /// What a class gains over the least gain with which it holds its place: from 1 on it does. What is small beside the
+    /// gain of another class may be that one's form, and blocks must agree.
+    fn worth(&self, at: &Fitted, less: &Fitted, index: usize, names: &[&'static str], odds: &[f64]) -> f64 {
+        let others = names
+            .iter()
+            .zip(odds)
+            .enumerate()
+            .filter(|(other, (name, _))| *other != index && !is_exact(name));
+        let strongest = others.map(|(_, (_, odds))| *odds).fold(0.0, f64::max);
+        let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
+        let by_odds = odds[index] / least;
+        if [at, less].iter().any(|one| one.parameters.walk.is_some()) {
+            // A walk fits the noise of the blocks too.
+            return by_odds;
+        }
+        let [gain, error] = self.problem.fitted_gain(less, at);
+        by_odds.min(gain / (BLOCKS_Z * error).max(f64::MIN_POSITIVE))
+    }
+
+    /// The other classes, fitted in a place, if their first steps promise these odds.
+    pub(crate) fn others(
+        &self,
+        pass: &Pass,
+        less: &Fitted,
+        names: &[&'static str],
+        ln_odds_least: f64,
+    ) -> Result<Vec<Beside>, DiscoverError> {
+        let evidence = pass.evidence();
+        let among = pass.among(|name| !names.contains(&name));
+        let mut best = evidence.sets_of_classes(&among, ln_odds_least);
+        best.truncate(OTHERS_MAX);
+        let start = |set: &Set| self.starts_of(pass, &evidence, set, pass.class_of(set.members[0]));
+        let starts: Vec<(&'static str, Vec<Term>)> = best.iter().flat_map(start).collect();
+        // Where the form misses much, more of them may be in the set.
+        self.fits(less, &starts, SET_UNITS)
+    }
+
+    /// True if the residual of a model depends on any covariate.
+    fn leaves_something(&self, at: &Fitted) -> Result<bool, DiscoverError> {
+        Ok(self.locate(at)?.p_value <= ALPHA)
+    }
+}
+
+/// Probabilities of a class with these odds, and of others in its place; likeliest others first.
+fn probabilities(
+    name: &'static str,
+    ln_odds: f64,
+    unit: f64,
+    form_odds: f64,
+    others: &[Beside],
+) -> Vec<(&'static str, f64)> {
+    let mut weights = vec![(name, 1.0)];
+    weights.extend(
+        others.iter().map(|other| (other.name, ((other.ln_odds - ln_odds) / unit).exp() / form_odds)),
+    );
+    weights[1..].sort_by(|a, b| b.1.total_cmp(&a.1));
+    let total: f64 = weights.iter().map(|(_, weight)| weight).sum();
+    weights.into_iter().map(|(name, weight)| (name, weight / total)).collect()
+}
+
+/// The other classes of the smallest set that has, with the first class, the wanted probability.
+fn credible(probabilities: &[(&'static str, f64)], mut others: Vec<Beside>) -> Vec<(&'static str, Fitted)> {
+    let mut reached = 0.0;
+    let mut same = Vec::new();
+    for (place, (name, probability)) in probabilities.iter().enumerate() {
+        if reached >= SET_PROBABILITY {
+            break;
+        }
+        reached += probability;
+        if let Some(other) = others.iter().position(|other| place > 0 && other.name == *name) {
+            same.push((*name, others.swap_remove(other).fitted));
+        }
+    }
+    same
+}
