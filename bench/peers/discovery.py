@@ -10,6 +10,7 @@ held-out presses decide, as in `tactus discover`.
 - Sparse regression: PySINDy's STLSQ on a library of generic terms of the signal and its derivatives and of the stage's
   motion. The threshold is the one that predicts held-out presses best. A term with at least a fifth of all weight names the
   effect whose first-order form it is; other effects of that form are its equivalents.
+- Symbolic and sparse regression that draft what no effect explains: `drafts.py`.
 
 `time` measures each of them, and a Gaussian process on 1,000 readings, on one table.
 """
@@ -36,6 +37,8 @@ from scipy.stats import ttest_1samp
 from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, WhiteKernel
+
+import drafts
 
 LEVEL = 0.028
 THRESHOLDS = (0.003, 0.01, 0.03, 0.1, 0.3)
@@ -87,7 +90,9 @@ def reported(folder, name):
     """Writes the report of each method on a set, unless it is there already."""
     warnings.filterwarnings("ignore")
     data = None
-    for method, work in (("black-box", black_box), ("sparse", sparse)):
+    drafting = {"symbolic": drafts.symbolic, "sparse-drafts": drafts.sparse}
+    drafting = {method: partial(drafted, draft) for method, draft in drafting.items()}
+    for method, work in {"black-box": black_box, "sparse": sparse, **drafting}.items():
         ran = folder / "peers" / method / "ran" / f"{name}.json"
         if ran.exists():
             continue
@@ -134,6 +139,10 @@ class Data:
         self.held, self.released = since(touched, self.t), since(~touched, self.t)
         self.past = np.maximum.accumulate(self.base, axis=0)
         self.at = np.stack([x - x.mean(), y - y.mean()], axis=1)
+        self.z, self.counts, self.pitch = z, counts.astype(float), rig["pitch_mm"]
+        self.height = np.where(touched, 0.0, z - np.quantile(z[touched], 0.98)).clip(0)
+        known = "temperature_c" in table.column_names and column("temperature_c").astype(float)
+        self.temperature = known if known is not False and np.isfinite(known).all() else None
         self.shape = (rows, cols)
         presses = np.unique(self.press[self.press >= 0])
         held = np.random.default_rng(1).permutation(presses)[: len(presses) // HELD_OUT]
@@ -227,6 +236,13 @@ def black_box(data):
     report["final"]["deeper_rms_counts"] = rms((data.residual - deep)[data.is_deep])
     report["base"]["deeper_rms_counts"] = rms(data.residual[data.is_deep])
     return report
+
+
+def drafted(draft, data):
+    """The report of a method that drafts: it names nothing, and says that something is missing if it has a draft."""
+    found = draft(data)
+    report = form(data, [], "unexplained" if found else "nothing-missing", None)
+    return {**report, "draft": found}
 
 
 def boosted(features, residual, rows):

@@ -66,3 +66,30 @@ fn the_labs_drafts_are_listed_shown_renamed_and_retired() {
     let said = effects(&[]);
     assert!(said.err.contains("drafts/twice.toml: ") && said.err.contains("too"), "{said:?}");
 }
+
+#[test]
+fn a_draft_is_put_into_the_labs_library_which_has_a_folder_of_its_own() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("draft-1.toml"), GROUNDED).unwrap();
+    let effects = |args: &[&str]| tactus(folder.path(), &[&["effects"], args].concat());
+    let count = || effects(&["--json"]).json()["effects"].as_array().unwrap().len();
+    assert_eq!(count(), 26, "the lab has none yet");
+
+    let said = effects(&["add", "draft-1.toml"]);
+    assert!(said.code == Some(0) && said.out.contains("every discovery tries draft-1"), "{said:?}");
+    assert!(folder.path().join("state/tactus/effects/draft-1.toml").exists());
+    assert_eq!(count(), 27);
+
+    let said = effects(&["add", "draft-1.toml"]);
+    assert_eq!(said.code, Some(2), "{said:?}");
+    assert!(said.err.contains("rename that one") && said.err.contains("draft-1.toml"), "{said:?}");
+    assert_eq!(effects(&["rename", "draft-1", "grounding"]).code, Some(0));
+    assert_eq!(effects(&["add", "draft-1.toml"]).code, Some(0));
+    assert_eq!(count(), 28);
+
+    fs::write(folder.path().join("foreign.toml"), "schema = \"tactus.rig/1\"\n").unwrap();
+    let said = effects(&["add", "foreign.toml"]);
+    assert_eq!(said.code, Some(2), "{said:?}");
+    assert!(said.err.contains("foreign.toml: "), "{said:?}");
+    assert_eq!(count(), 28, "nothing is added");
+}

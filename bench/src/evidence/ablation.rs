@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 
 use super::campaign::{Campaign, Planned};
+use super::drafts::DraftScores;
 use super::outcome::{Outcome, read};
 use super::rate::{Rate, quantile};
 use super::run::Places;
@@ -31,6 +32,8 @@ pub struct Ablation {
     pub unexplained: Rate,
     /// Sets outside the library: an effect is named.
     pub outside_named: Rate,
+    /// Drafts of what no effect explains.
+    pub drafts: DraftScores,
     /// Shrink on held-out presses of all depths, where the gap is known within a tenth.
     pub shrink: Shrink,
     /// Shrink on presses deeper than any fitted one, on the same sets.
@@ -75,6 +78,11 @@ impl Ablation {
             pairs: Rate::of(of(Campaign::Pairs), Outcome::names_all),
             unexplained: Rate::of(of(Campaign::Outside), |set| set.verdict == "unexplained"),
             outside_named: Rate::of(of(Campaign::Outside), |set| !set.named.is_empty()),
+            drafts: DraftScores::new(
+                &of(Campaign::FalseAlarms).collect::<Vec<_>>(),
+                &of(Campaign::Names).collect::<Vec<_>>(),
+                &of(Campaign::Outside).collect::<Vec<_>>(),
+            ),
             shrink: Shrink::new(known().filter_map(|set| set.shrink)),
             deeper_shrink: Shrink::new(known().filter_map(|set| set.deeper_shrink)),
             seconds: quantile(outcomes.iter().map(|set| set.seconds).collect(), 0.5),

@@ -367,8 +367,13 @@ fn drafts(f: &mut fmt::Formatter<'_>, scores: &DraftScores) -> fmt::Result {
         f,
         "\n## Drafts\n\nA draft is right if its stage and its first covariate are those of the hidden physics. All sets are in the denominators, \
          those included in which an effect was named or nothing was seen. Physics that is drawn anew for each reading has no mean to draft; it is \
-         drafted in {} of {} sets.\n\n| physics | sets | drafted | right stage and covariate | right, and 70 % closed |\n|---|---|---|---|---|",
-        scores.of_single.hits, scores.of_single.of
+         drafted in {} of {} sets. Something is drafted in {} of {} sets without hidden physics, and in {} of {} with one effect of the library.\n\n| physics | sets | drafted | right stage and covariate | right, and 70 % closed |\n|---|---|---|---|---|",
+        scores.of_single.hits,
+        scores.of_single.of,
+        scores.of_nothing.hits,
+        scores.of_nothing.of,
+        scores.of_named.hits,
+        scores.of_named.of
     )?;
     for (physics, DraftScore { drafted, right, right_and_closed }) in &scores.outside {
         writeln!(
@@ -414,6 +419,32 @@ fn methods(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
             shrunk(&method.deeper_shrink),
             method.seconds.unwrap_or(f64::NAN),
         )?;
+    }
+    methods_that_draft(f, ablations)
+}
+
+/// Drafts by other methods on the same sets.
+fn methods_that_draft(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
+    let drafts = |method: &&Ablation| {
+        let DraftScores { outside, of_nothing, of_named, .. } = &method.drafts;
+        let of_outside = outside.get("all").map_or(0, |all| all.drafted.hits);
+        of_outside + of_nothing.hits + of_named.hits > 0
+    };
+    let drafting: Vec<&Ablation> = ablations.iter().filter(drafts).collect();
+    if drafting.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        f,
+        "\nDrafts of what no effect explains:\n\n| method | right stage and covariate | right, and 70 % closed | drafted where nothing is hidden | drafted where an effect of the library is |\n|---|---|---|---|---|"
+    )?;
+    for Ablation { method, drafts: DraftScores { outside, of_nothing, of_named, .. }, .. } in drafting {
+        let of = |rate: Rate| format!("{} of {}", rate.hits, rate.of);
+        let [right, closed] = match outside.get("all") {
+            Some(all) => [of(all.right), of(all.right_and_closed)],
+            None => ["none".to_owned(), "none".to_owned()],
+        };
+        writeln!(f, "| {method} | {right} | {closed} | {} | {} |", of(*of_nothing), of(*of_named))?;
     }
     Ok(())
 }

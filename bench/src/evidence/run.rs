@@ -168,6 +168,8 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
     let mut discover = Command::new(&workflow.tactus);
     discover.args(["--json", "discover", "--threads", "1", "--seed"]).arg(DISCOVERY_SEED.to_string());
     discover.args(&workflow.more).arg("--out").arg(&out).arg(&table);
+    // No effects of the lab take part.
+    discover.env("XDG_STATE_HOME", &folder).env_remove("STATE_DIRECTORY");
     discover.stdout(Stdio::null()).stderr(File::create(&log).with_context(|| at(&log))?);
     let Watched { exit, seconds, processor_s, peak_mib } = watched(&mut discover)?;
     let told =

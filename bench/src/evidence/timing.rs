@@ -91,6 +91,8 @@ impl Timing {
 fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<Watched> {
     let mut discover = Command::new(tactus);
     discover.args(["--json", "discover", "--out"]).arg(out).arg(table).stdout(Stdio::null());
+    // No effects of the lab take part.
+    discover.env("XDG_STATE_HOME", out).env_remove("STATE_DIRECTORY");
     let ended = watched(&mut discover)?;
     ensure!(ended.exit.success(), "{} {} failed: {}", tactus.display(), table.display(), ended.exit);
     Ok(ended)

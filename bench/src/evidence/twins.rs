@@ -147,6 +147,8 @@ impl Twins {
         run.args(["--json", "run", self.experiment, "--no-report", "--seed", "3", "--out"]);
         let summary: Summary = serde_json::from_slice(&on_rig(run.arg(folder.join("paper")))?)?;
         let mut discover = Command::new(tactus);
+        // No effects of the lab take part.
+        discover.env("XDG_STATE_HOME", &folder).env_remove("STATE_DIRECTORY");
         discover.args(["--json", "discover", "--active", "--budget-min"]).arg(BUDGET_MIN.to_string());
         on_rig(discover.arg(summary.recording).arg("--out").arg(&out))?;
         let report: DiscoveryReport = parsed(&out.join("report.json"))?;

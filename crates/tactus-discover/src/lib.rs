@@ -26,6 +26,6 @@ pub use search::{
 };
 pub use tactus_calibrate::{FaultKind, FaultyElement};
 pub use verdict::{
-    AddedEffect, BaseModel, Confirmation, Discovery, DraftedEffect, ElementGap, Estimated, Final,
+    AddedEffect, BaseModel, Closed, Confirmation, Discovery, DraftedEffect, ElementGap, Estimated, Final,
     FittedCurve, FittedKnot, GlobalTest, Inclusion, Level, Split, Stair, Structured, Unexplained, Verdict,
 };

@@ -12,8 +12,10 @@
 //! An added effect must be confirmed: fitted presses that its parameters have not seen, by five folds, must be nearer to the model with it than
 //! to the model without. The held-out presses are opened for the figures alone.
 //!
-//! Where the verdict leaves something unexplained, it is drafted ([`drafting`]). The report is a [`Discovery`].
+//! Where the verdict leaves something unexplained, it is drafted ([`drafting`]). How much a draft closes of what is left, which may be far below
+//! the noise, is measured so that the noise cancels ([`closed`]). The report is a [`Discovery`].
 
+mod closed;
 mod conclude;
 mod discovery;
 mod drafting;
@@ -21,6 +23,7 @@ mod held_out;
 mod own_noise;
 mod structured;
 
+pub use closed::Closed;
 pub(crate) use conclude::{SearchOutcome, cannot_judge, conclude, confirmed};
 pub use discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,

@@ -32,10 +32,10 @@ use crate::{
 
 pub use active::{ActiveRun, AmbiguousEffect, command};
 pub use draft::status as draft_status;
-pub use figures::{drafted_curve, element_maps, free_curve, residual_against, staircase};
+pub use figures::{drafted_curve, drafted_weights, element_maps, free_curve, residual_against, staircase};
 pub use json::discovery_json;
 pub use next::{Proposal, not_proposed, nothing_open, open, proposals};
-pub use words::in_words;
+pub use words::{closed, in_words};
 
 /// A discovery and its data.
 #[derive(Debug, Clone, Copy)]
@@ -101,7 +101,7 @@ pub fn discovery_html(report: &DiscoveryReport<'_>) -> String {
         tried::section(f, report.discovery)?;
         added::section(f, report.discovery)?;
         active::section(f, report)?;
-        after::sections(f, report.discovery)?;
+        after::sections(f, report)?;
         basis::section(f, report)
     });
     document(format!("Discovery \u{b7} {}", report.rig), page)

@@ -67,6 +67,9 @@ pub struct DraftConfirmation {
     /// Share of what is left without it that it closes there, on presses that were not fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub closed_share: Option<f64>,
+    /// Its standard error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed_share_se: Option<f64>,
 }
 
 /// What became of a draft.
@@ -111,6 +114,9 @@ pub struct DraftEvidence {
     pub folds: u32,
     /// Share of what was left that it closes on presses that nobody had opened when it was drafted; `None` where nothing was left there.
     pub closed_share: Option<f64>,
+    /// Its standard error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed_share_se: Option<f64>,
 }
 
 /// Why a file is not a draft.

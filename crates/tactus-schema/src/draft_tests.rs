@@ -49,12 +49,14 @@ fn file() -> DraftFile {
             ln_odds: 103.25,
             folds: 5,
             closed_share: Some(0.93),
+            closed_share_se: Some(0.04),
         }),
         confirmation: Some(DraftConfirmation {
             data: [("run-2".to_owned(), "11ee".to_owned())].into(),
             strength: 1.0 / 3.0,
             strength_se: Some(0.02),
             closed_share: None,
+            closed_share_se: None,
         }),
     }
 }

@@ -34,17 +34,21 @@ use crate::numbers::parallel;
 
 /// Atoms that are weighed by their evidence.
 const WEIGHED_MAX: usize = 12;
-/// Second covariates that are tried beside the best one.
-const SECONDS_MAX: usize = 12;
-/// Knots of the curve of a single covariate, and for each of two.
+/// Greatest number of columns of a pass over second covariates.
+const COLUMNS_MAX: usize = 200;
+/// Drafts that are tried as effects, the best first.
+const TRIED_MAX: usize = 3;
+/// Knots of the curve of a covariate, and of a second one beside it.
 const KNOTS: usize = 7;
-const KNOTS_OF_TWO: usize = 4;
+const KNOTS_OF_SECOND: usize = 4;
+/// Of what acts on every element, near or far: the range of distances is wide.
+const KNOTS_OF_EVERY: usize = 12;
 /// Folds of blocks in which the same atom should come first.
 const FOLDS: usize = 5;
 /// Logarithm of the odds by which a draft must be ahead of every class.
 const AHEAD_LN_ODDS: f64 = 5.0;
 /// Least part of a draft that recalibration and the model do not take up.
-const OWN_LEAST: f64 = 0.1;
+const OWN_LEAST: f64 = 0.05;
 /// In so many folds the same atom must come first.
 const FOLDS_LEAST: usize = 4;
 /// Changes the seed, so that drafts have other sign flips than classes and covariates.
@@ -116,38 +120,100 @@ struct Weighed {
     directions: Vec<usize>,
 }
 
+/// Atoms that compete.
+struct Field<'a> {
+    weighed: &'a [Weighed],
+    grams: &'a Grams,
+    additions: &'a [Addition],
+    /// Those that are still in it, with the logarithm of their odds, greatest first.
+    ranked: Vec<(usize, f64)>,
+    /// The classes of the library that come nearest, with the logarithm of their odds.
+    classes: Vec<(&'static str, f64)>,
+    /// Number of atoms of the grammar.
+    count: f64,
+}
+
+impl Field<'_> {
+    /// Of those that are as good as the first the one with the fewest numbers.
+    fn best(&self) -> Option<(usize, f64)> {
+        let as_good = as_good_as_first(&self.ranked);
+        as_good.into_iter().min_by_key(|(one, _)| self.weighed[*one].directions.len())
+    }
+
+    /// Those that are as good and act on something else or by something else, in words.
+    fn alike(&self, best: usize) -> Vec<String> {
+        let as_good = as_good_as_first(&self.ranked);
+        let others = as_good.into_iter().filter(|(one, _)| !self.is_like(*one, best));
+        let mut words: Vec<String> = others.map(|(one, _)| words::of_atom(&self.weighed[one].atom)).collect();
+        words.dedup();
+        words
+    }
+
+    /// Leaves out an atom and all that act on the same by the same.
+    fn leave_out(&mut self, best: usize) {
+        let weighed = self.weighed;
+        self.ranked.retain(|(one, _)| !weighed[*one].atom.is_like(&weighed[best].atom));
+    }
+
+    fn is_like(&self, one: usize, other: usize) -> bool {
+        self.weighed[one].atom.is_like(&self.weighed[other].atom)
+    }
+}
+
 impl Search<'_> {
-    /// Drafts what a model leaves, as an effect of this name.
+    /// Drafts what a model leaves, as an effect of this name. If what comes first is no draft, that which comes next is tried, as if the first
+    /// were not in the grammar.
     pub(crate) fn draft(&self, at: &Fitted, name: &str) -> Result<Outcome, DiscoverError> {
         let sight = Arc::new(Sight::of(self.problem, at)?);
         (self.progress)("drafting what nobody has named", 0.0);
         let atoms = grammar::atoms(self.problem, at, &sight, self.rounds);
-        let count = atoms.len() as f64;
         let (p_value, first) = self.screened(at, &sight, &atoms)?;
         if p_value > ALPHA {
             return Ok(Err(NoDraft::Noise));
         }
         let (weighed, grams) = self.products(at, &sight, first)?;
-        let additions = additions(&weighed, &grams, count);
-        let evidence = self.evidence_of(&additions, grams.reduced());
-        let ranked = ranked(&evidence);
-        let as_good = as_good_as_first(&ranked);
-        // Of those that are as good the one with the fewest numbers.
-        let simplest = as_good.iter().min_by_key(|(one, _)| weighed[*one].directions.len());
-        let Some((best, ln_odds)) = simplest.copied() else { return Ok(Err(NoDraft::NoGain)) };
-        let alike = as_good.iter().filter(|(one, _)| !weighed[*one].atom.is_like(&weighed[best].atom));
-        let mut alike: Vec<String> = alike.map(|(one, _)| words::of_atom(&weighed[*one].atom)).collect();
-        alike.dedup();
-        let folds = self.folds(&additions, &weighed, &grams, best);
+        let additions = additions(&weighed, &grams, atoms.len() as f64);
+        let mut field = Field {
+            ranked: ranked(&self.evidence_of(&additions, grams.reduced())),
+            additions: &additions,
+            weighed: &weighed,
+            grams: &grams,
+            classes: self.classes(at)?,
+            count: atoms.len() as f64,
+        };
+        let mut why = NoDraft::NoGain;
+        for nth in 0..TRIED_MAX {
+            let Some((best, ln_odds)) = field.best() else { break };
+            match self.drafted(at, &sight, &field, (best, ln_odds, p_value), name)? {
+                Ok(found) => return Ok(Ok(found)),
+                Err(other) if nth == 0 => why = other,
+                Err(_) => (),
+            }
+            field.leave_out(best);
+        }
+        Ok(Err(why))
+    }
+
+    /// The best atom of a field as a draft.
+    fn drafted(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        field: &Field<'_>,
+        (best, ln_odds, p_value): (usize, f64, f64),
+        name: &str,
+    ) -> Result<Outcome, DiscoverError> {
+        let folds = self.folds(field, best);
         if folds < FOLDS_LEAST {
             return Ok(Err(NoDraft::Unsteady));
         }
-        let nearest = self.nearest(at, ln_odds)?;
+        let nearest: Vec<(&'static str, f64)> =
+            field.classes.iter().map(|(class, odds)| (*class, ln_odds - odds)).collect();
         if let Some((class, _)) = nearest.first().filter(|(_, behind)| *behind < AHEAD_LN_ODDS) {
             return Ok(Err(NoDraft::Class(class)));
         }
-        let best = self.with_second(at, &sight, &weighed[best].atom, ln_odds, count)?;
-        let Some(AsEffect { draft, at: with, covariance, knots }) = self.as_effect(at, &sight, best, name)?
+        let atom = self.with_second(at, sight, &field.weighed[best].atom, ln_odds, field.count)?;
+        let Some(AsEffect { draft, at: with, covariance, knots }) = self.as_effect(at, sight, atom, name)?
         else {
             return Ok(Err(NoDraft::NoGain));
         };
@@ -158,6 +224,7 @@ impl Search<'_> {
         if ln_odds < AHEAD_LN_ODDS {
             return Ok(Err(NoDraft::NoGain));
         }
+        let alike = field.alike(best);
         Ok(Ok(Box::new(Drafted {
             draft,
             at: with,
@@ -234,7 +301,8 @@ impl Search<'_> {
 
     /// In how many folds of blocks the best atom comes first or is as good as the first: of the blocks not in the fold, whose products with the
     /// residual are summed.
-    fn folds(&self, additions: &[Addition], weighed: &[Weighed], grams: &Grams, best: usize) -> usize {
+    fn folds(&self, field: &Field<'_>, best: usize) -> usize {
+        let grams = field.grams;
         let blocks = grams.along(0).len();
         let first_in = |fold: &usize| {
             let is_other = |(block, _): &(usize, &f64)| block % FOLDS != *fold;
@@ -248,20 +316,20 @@ impl Search<'_> {
                 products[(direction, last)] = wanted;
                 products[(last, direction)] = wanted;
             }
-            let ranked = ranked(&self.evidence_of(additions, &products));
-            as_good_as_first(&ranked).iter().any(|(one, _)| weighed[*one].atom.is_like(&weighed[best].atom))
+            let mut ranked = ranked(&self.evidence_of(field.additions, &products));
+            ranked.retain(|(one, _)| field.ranked.iter().any(|(there, _)| there == one));
+            as_good_as_first(&ranked).iter().any(|(one, _)| field.is_like(*one, best))
         };
         (0..FOLDS).filter(first_in).count()
     }
 
-    /// The classes whose first step comes nearest, with by how much each is behind a draft of these odds.
-    fn nearest(&self, at: &Fitted, ln_odds: f64) -> Result<Vec<(&'static str, f64)>, DiscoverError> {
+    /// The classes whose first step comes nearest, with the logarithm of their odds.
+    fn classes(&self, at: &Fitted) -> Result<Vec<(&'static str, f64)>, DiscoverError> {
         let pass = self.pass(at)?;
         let evidence = pass.evidence();
         let best = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), f64::NEG_INFINITY);
-        let gain =
-            |(addition, gain): &(usize, Gain)| (pass.class_of(*addition), ln_odds - gain.ln_odds.max(0.0));
-        Ok(best.iter().map(gain).take(3).collect())
+        let of = |(addition, gain): &(usize, Gain)| (pass.class_of(*addition), gain.ln_odds.max(0.0));
+        Ok(best.iter().map(of).take(3).collect())
     }
 
     /// The atom with a second covariate, if one gains more than a form is excused for; else as it is.
@@ -275,7 +343,8 @@ impl Search<'_> {
     ) -> Result<Atom, DiscoverError> {
         let seconds: Vec<Atom> = grammar::with_seconds(best, sight).collect();
         let mut found = (ln_odds + excused(ln_odds), best.clone());
-        for some in seconds.chunks(SECONDS_MAX) {
+        let each = seconds.first().map_or(1, |second| second.columns(sight.elements));
+        for some in seconds.chunks((COLUMNS_MAX / each).max(1)) {
             let (weighed, grams) = self.products(at, sight, some.to_vec())?;
             let additions = additions(&weighed, &grams, count * seconds.len() as f64);
             let first = ranked(&self.evidence_of(&additions, grams.reduced())).into_iter().next();

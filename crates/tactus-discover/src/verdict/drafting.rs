@@ -3,8 +3,9 @@
 use tactus_model::Effect;
 use tactus_model::effect::{Definition, Draft};
 
+use super::closed::Closed;
 use super::discovery::{BaseModel, Verdict};
-use super::held_out::{HeldOutResidual, closed_share};
+use super::held_out::HeldOutResidual;
 use crate::data::{DiscoverError, Floor};
 use crate::fit::{Fitted, Prepared, Term};
 use crate::next::DraftModel;
@@ -32,8 +33,8 @@ pub struct DraftedEffect {
     pub nearest: Vec<(&'static str, f64)>,
     /// Other drafts that these data cannot tell from it, in words.
     pub alike: Vec<String>,
-    /// Share of what was left that it closes on held-out presses; `None` where nothing was left there.
-    pub closed_share: Option<f64>,
+    /// How much of what was left it closes on held-out presses; `None` where nothing was left there.
+    pub closed: Option<Closed>,
     /// Root mean square of the residual on held-out presses without it and with it.
     pub heldout_rms_before_counts: f64,
     /// With it.
@@ -47,7 +48,7 @@ pub struct DraftedEffect {
 impl DraftedEffect {
     /// True if it closes less than 70 % of what was left.
     pub fn is_partial(&self) -> bool {
-        self.closed_share.is_none_or(|share| share < CLOSED_LEAST)
+        self.closed.is_none_or(|closed| closed.share < CLOSED_LEAST)
     }
 }
 
@@ -83,10 +84,8 @@ pub(super) fn drafted(
         Ok(found) => *found,
         Err(none) => return Ok(Drafting { draft: Some(Err(none)), model: None }),
     };
-    let noise_counts = floor.rms_counts().unwrap_or(0.0);
     let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest, alike } = found;
-    let after = prepared.held(&at.parameters)?;
-    let [before, after] = [of_grown.rms_counts, after.rms_counts];
+    let of_draft = prepared.held(&at.parameters)?;
     let model = at.parameters.terms.last().map(|term| DraftModel {
         name: term.definition.name,
         with: at.parameters.clone(),
@@ -101,9 +100,9 @@ pub(super) fn drafted(
         folds,
         nearest,
         alike,
-        closed_share: closed_share([before, after], noise_counts),
-        heldout_rms_before_counts: before,
-        heldout_rms_after_counts: after,
+        closed: prepared.closed([of_grown, &of_draft], floor),
+        heldout_rms_before_counts: of_grown.rms_counts,
+        heldout_rms_after_counts: of_draft.rms_counts,
         base: super::conclude::base_of(prepared, &at.parameters),
         effects: at.parameters.effects()?,
     };
@@ -117,8 +116,8 @@ pub struct Confirmation {
     pub strength: f64,
     /// Standard error of the strength.
     pub strength_se: Option<f64>,
-    /// Share of what the model leaves without it that it closes on presses that were not fitted; `None` where nothing is left there.
-    pub closed_share: Option<f64>,
+    /// How much of what the model leaves without it it closes on presses that were not fitted; `None` where nothing is left there.
+    pub closed: Option<Closed>,
     /// Root mean square of the residual on those presses without it.
     pub heldout_rms_before_counts: f64,
     /// With it.
@@ -137,7 +136,7 @@ impl Confirmation {
         let apart = (self.strength - 1.0).abs();
         let is_as_strong =
             apart <= STRENGTH_APART || self.strength_se.is_some_and(|error| apart <= STRENGTH_SE * error);
-        self.closed_share.is_some_and(|share| share >= CONFIRMED_LEAST) && is_as_strong
+        self.closed.is_some_and(|closed| closed.share >= CONFIRMED_LEAST) && is_as_strong
     }
 }
 
@@ -150,16 +149,15 @@ pub(crate) fn confirmation(
     let with = Term { values: vec![1.0], ..Term::neutral(draft) };
     let fitted = prepared.problem().fit_from(base.with(with), POLISH_ROUNDS)?;
     let (before, after) = (prepared.held(base)?, prepared.held(&fitted.parameters)?);
-    let noise_counts = prepared.floor_of(&after).rms_counts().unwrap_or(0.0);
-    let [before, after] = [before.rms_counts, after.rms_counts];
+    let floor = prepared.floor_of(&after);
     let last = fitted.parameters.terms.last().zip(fitted.errors.last());
     let (strength, error) = last.map_or((0.0, f64::NAN), |(term, errors)| (term.values[0], errors[0]));
     Ok(Confirmation {
         strength,
         strength_se: Some(error).filter(|error| error.is_finite()),
-        closed_share: closed_share([before, after], noise_counts),
-        heldout_rms_before_counts: before,
-        heldout_rms_after_counts: after,
+        closed: prepared.closed([&before, &after], floor),
+        heldout_rms_before_counts: before.rms_counts,
+        heldout_rms_after_counts: after.rms_counts,
     })
 }
 

@@ -54,7 +54,7 @@ fn a_supply_that_sags_is_drafted_as_a_share_of_the_signal_by_the_sum() {
     let draft = &drafted.draft;
     assert_eq!((draft.carrier, draft.stage()), (Carrier::OwnSignal, PipelineStage::Element), "{draft:?}");
     assert_eq!(draft.covariates, [Covariate::SumOfSignals], "{draft:?}");
-    assert!(!drafted.is_partial(), "{:?}", drafted.closed_share);
+    assert!(!drafted.is_partial(), "{:?}", drafted.closed);
     assert!(drafted.p_value <= 0.005 && drafted.folds >= 4, "{drafted:?}");
     // The curve, in mm of 1000 counts; a constant share is the gain's.
     let [least, most] = draft.ranges[0];
@@ -77,7 +77,7 @@ fn counts_that_come_with_contact_are_drafted_with_a_weight_for_each_element() {
     assert!(matches!(draft.carrier, Carrier::Counts | Carrier::EveryElement), "{draft:?}");
     assert_eq!((draft.when, draft.law.numbers().len()), (When::InContact, 2), "{draft:?}");
     let counts = if draft.carrier == Carrier::Counts { 1.0 } else { 1000.0 };
-    assert!(!drafted.is_partial(), "{:?}", drafted.closed_share);
+    assert!(!drafted.is_partial(), "{:?}", drafted.closed);
     let at = draft.ranges[0].iter().sum::<f64>() / 2.0;
     let weights = draft.weights.as_ref().expect("weights");
     for (element, own) in weights.iter().enumerate() {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::closed::{Closed, closed};
 use super::discovery::{ElementGap, Level};
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, Noise, QUIETEST, turns};
@@ -136,17 +137,40 @@ impl Prepared<'_> {
         (0..self.frames.len()).map(|frame| turns(self.frames, frame)).collect()
     }
 
+    /// How much of what a model leaves on held-out presses another model closes.
+    pub(super) fn closed(&self, [before, after]: [&HeldOutResidual; 2], floor: Floor) -> Option<Closed> {
+        let (elements, turns) = (self.frames.elements, self.turns());
+        let of_before = |before: &Readings<'_>| {
+            let of_both = |after: &Readings<'_>| closed([before, after], |place| !turns[place / elements]);
+            self.on_readings(after, floor, of_both)?
+        };
+        self.on_readings(before, floor, of_before)?
+    }
+
     fn structured_among(
         &self,
         held: &HeldOutResidual,
         floor: Floor,
         among: impl Fn(usize) -> bool,
     ) -> Option<Structured> {
+        self.on_readings(held, floor, |readings| readings.structured(among))?
+    }
+
+    /// Something of a residual's readings on held-out presses; `None` without a floor.
+    fn on_readings<T>(
+        &self,
+        held: &HeldOutResidual,
+        floor: Floor,
+        something: impl FnOnce(&Readings<'_>) -> T,
+    ) -> Option<T> {
         let rms_counts = floor.rms_counts()?;
         let scale = rms_counts / self.noise.rms_counts;
         let noise_counts: Vec<f64> = self.noise.by_element_counts.iter().map(|rms| rms * scale).collect();
         let lag = self.noise.memory_frames();
-        let readings = Readings {
+        let late = Readings::late(lag);
+        let late_count = late.clone().count() as f64;
+        let late_correlation = late.map(|lag| self.noise.correlation_at(lag)).sum::<f64>() / late_count;
+        Some(something(&Readings {
             elements: self.frames.elements,
             residual: &held.residual,
             presses: &self.heldout_presses(),
@@ -154,9 +178,9 @@ impl Prepared<'_> {
             noise_counts: &noise_counts,
             lag,
             correlation: self.noise.correlation_at(lag),
+            late_correlation,
             freedom: floor.freedom()?,
-        };
-        readings.structured(among)
+        }))
     }
 
     /// Frames of each held-out press and of each held-out rest between presses.

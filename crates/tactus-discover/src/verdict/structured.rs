@@ -20,7 +20,7 @@
 //! # Source
 //! Jackknife: B. Efron, *The Jackknife, the Bootstrap and Other Resampling Plans* (1982), ch. 3.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use crate::numbers::student_95;
 
@@ -55,12 +55,14 @@ pub(crate) struct Readings<'a> {
     /// Frames after which the noise has forgotten itself, and the correlation that is left.
     pub(crate) lag: usize,
     pub(crate) correlation: f64,
+    /// Mean correlation that is left at [`late`](Readings::late) lags.
+    pub(crate) late_correlation: f64,
     /// Degrees of freedom of the noise.
     pub(crate) freedom: f64,
 }
 
 /// Sums over the readings of one press: of a quantity, and of readings.
-type Sums = [f64; 2];
+pub(super) type Sums = [f64; 2];
 
 impl Readings<'_> {
     /// What is structured among the readings that `among` selects by their place in the residual; `None` if there are none.
@@ -70,7 +72,7 @@ impl Readings<'_> {
             sums.iter().map(|of| of[which]).filter(|[_, count]| *count > 0.0).collect::<Vec<Sums>>()
         });
         let (value, error) = jackknife(&all)?;
-        let error = error.hypot((2.0 / self.freedom).sqrt() * (1.0 + value));
+        let error = self.with_noise(value, error);
         let mut found = Structured {
             rms_noise: value.max(0.0).sqrt(),
             upper_noise: (value + student_95(all.len()) * error).max(0.0).sqrt(),
@@ -84,8 +86,40 @@ impl Readings<'_> {
         Some(found)
     }
 
+    /// The standard error of a mean of squares, with that of the noise.
+    pub(super) fn with_noise(&self, value: f64, error: f64) -> f64 {
+        error.hypot((2.0 / self.freedom).sqrt() * (1.0 + value))
+    }
+
+    /// Lags at which hardly anything of the noise is left, of which each shows what lasts: for this many frames of memory.
+    pub(super) const fn late(lag: usize) -> RangeInclusive<usize> {
+        3 * lag..=9 * lag
+    }
+
+    /// The products of readings at late lags, less those of the noise, and their number.
+    pub(super) fn late_sums(&self, press: &Range<usize>, among: impl Fn(usize) -> bool) -> Sums {
+        let mut sums = [0.0; 2];
+        let elements = self.noise_counts.iter().zip(self.unit_counts).enumerate();
+        for (element, (noise, unit)) in elements.filter(|(_, (noise, _))| noise.is_finite()) {
+            let own = self.late_correlation * (noise / unit).powi(2);
+            let value = |frame: usize| {
+                let place = frame * self.elements + element;
+                among(place).then(|| f64::from(self.residual[place]) / unit)
+            };
+            let values: Vec<Option<f64>> = press.clone().map(value).collect();
+            for lag in Self::late(self.lag) {
+                let pairs = values.iter().zip(values.iter().skip(lag));
+                for (now, then) in pairs.filter_map(|(now, then)| now.zip(*then)) {
+                    sums[0] += now * then - own;
+                    sums[1] += 1.0;
+                }
+            }
+        }
+        sums
+    }
+
     /// The products of readings a lag apart, and the squares of readings, less those of the noise.
-    fn sums(&self, press: &Range<usize>, among: impl Fn(usize) -> bool) -> [Sums; 2] {
+    pub(super) fn sums(&self, press: &Range<usize>, among: impl Fn(usize) -> bool) -> [Sums; 2] {
         let (mut lasting, mut all) = ([0.0; 2], [0.0; 2]);
         let elements = self.noise_counts.iter().zip(self.unit_counts).enumerate();
         for (element, (noise, unit)) in elements.filter(|(_, (noise, _))| noise.is_finite()) {
@@ -110,7 +144,7 @@ impl Readings<'_> {
 }
 
 /// A mean over the readings of presses, and its standard error; `None` of no readings. The error of few presses is infinite.
-fn jackknife(presses: &[Sums]) -> Option<(f64, f64)> {
+pub(super) fn jackknife(presses: &[Sums]) -> Option<(f64, f64)> {
     let [sum, readings] = presses.iter().fold([0.0; 2], |[sum, count], [s, c]| [sum + s, count + c]);
     let count = presses.len() as f64;
     let without: Vec<f64> = presses.iter().map(|[s, c]| (sum - s) / (readings - c)).collect();

@@ -43,6 +43,7 @@ impl Planted {
             unit_counts: &[noise; ELEMENTS],
             lag: 1,
             correlation: 0.0,
+            late_correlation: 0.0,
             freedom,
         };
         readings.structured(|_| true).unwrap()

@@ -5,7 +5,7 @@ use std::fmt;
 use tactus_discover::{Discovery, Level, Verdict};
 
 use super::{
-    draft,
+    DiscoveryReport, draft,
     figures::staircase,
     gap, next,
     words::{list, percent},
@@ -16,10 +16,11 @@ use crate::{
     numbers::digits,
 };
 
-pub(super) fn sections(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
+pub(super) fn sections(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Result {
+    let found = report.discovery;
     before_and_after(f, found)?;
     unexplained(f, found)?;
-    draft::section(f, found)?;
+    draft::section(f, report)?;
     next::section(f, found)
 }
 

@@ -2,13 +2,14 @@
 
 use std::fmt;
 
-use tactus_discover::{Discovery, DraftedEffect, NoDraft};
+use tactus_discover::{DraftedEffect, NoDraft};
 use tactus_model::effect::Law;
 use tactus_schema::draft::{DraftStatus, stage_name};
 
 use super::{
-    figures::drafted_curve,
-    words::{self, percent},
+    DiscoveryReport,
+    figures::{drafted_curve, drafted_weights},
+    words,
 };
 use crate::{
     document::{Column, Table},
@@ -21,11 +22,11 @@ pub fn status(found: &DraftedEffect) -> DraftStatus {
     if found.is_partial() { DraftStatus::Partial } else { DraftStatus::Drafted }
 }
 
-pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
-    match &found.draft {
+pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Result {
+    match &report.discovery.draft {
         None => Ok(()),
         Some(Err(none)) => no_draft(f, none),
-        Some(Ok(draft)) => drafted(f, found, draft),
+        Some(Ok(draft)) => drafted(f, report, draft),
     }
 }
 
@@ -33,7 +34,7 @@ fn no_draft(f: &mut fmt::Formatter<'_>, none: &NoDraft) -> fmt::Result {
     writeln!(f, "<section>\n<h2>Draft of an effect</h2>\n<p>None: {}.</p>\n</section>", Text(none.in_words()))
 }
 
-fn drafted(f: &mut fmt::Formatter<'_>, found: &Discovery, one: &DraftedEffect) -> fmt::Result {
+fn drafted(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>, one: &DraftedEffect) -> fmt::Result {
     let draft = &one.draft;
     writeln!(
         f,
@@ -44,17 +45,22 @@ fn drafted(f: &mut fmt::Formatter<'_>, found: &Discovery, one: &DraftedEffect) -
         Text(&draft.sentence),
         Text(&draft.name),
     )?;
-    if !one.knots.is_empty() {
+    if let Some(curve) = drafted_curve(one) {
+        let caption = match (&draft.law, one.knots.is_empty()) {
+            (Law::Table { .. }, false) => "fitted knots with standard errors",
+            (_, false) => "fitted knots with standard errors, and the law that passes through them",
+            (Law::Table { .. }, true) => {
+                "straight lines between its knots, for each knot of the second covariate"
+            }
+            (_, true) => "the fitted law",
+        };
         writeln!(
             f,
-            "<figure>\n{}\n<figcaption>The draft\u{2019}s curve: fitted knots with standard errors{}.</figcaption>\n</figure>",
-            drafted_curve(one),
-            if matches!(draft.law, Law::Table { .. }) {
-                ""
-            } else {
-                ", and the law that passes through them"
-            }
+            "<figure>\n{curve}\n<figcaption>The draft\u{2019}s curve: {caption}.</figcaption>\n</figure>"
         )?;
+    }
+    if let Some(weights) = drafted_weights(report.array, draft) {
+        writeln!(f, "<figure>\n{weights}\n<figcaption>Its weight for each element.</figcaption>\n</figure>")?;
     }
     let mut table = Table::new(&[Column::Name("what"), Column::Name("value")]);
     let covariates: Vec<String> = draft
@@ -80,7 +86,7 @@ fn drafted(f: &mut fmt::Formatter<'_>, found: &Discovery, one: &DraftedEffect) -
     };
     let nearest: Vec<String> =
         one.nearest.iter().map(|(name, behind)| format!("{name} ({} behind)", digits(*behind, 3))).collect();
-    let noise = found.floor.rms_counts();
+    let noise = report.discovery.floor.rms_counts();
     let level = |counts: f64| words::level(counts, noise);
     let alike = if one.alike.is_empty() { "none".to_owned() } else { one.alike.join("; ") };
     for (what, value) in [
@@ -96,7 +102,7 @@ fn drafted(f: &mut fmt::Formatter<'_>, found: &Discovery, one: &DraftedEffect) -
         ("folds in which it comes first or as good", format!("{} of 5", one.folds)),
         ("held-out residual without it", level(one.heldout_rms_before_counts)),
         ("held-out residual with it", level(one.heldout_rms_after_counts)),
-        ("closes of what was left", one.closed_share.map_or_else(|| "unknown".into(), percent)),
+        ("closes of what was left", one.closed.map_or_else(|| "unknown".into(), words::closed)),
     ] {
         table.row([what.to_owned(), value]);
     }

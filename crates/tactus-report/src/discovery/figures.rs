@@ -4,6 +4,7 @@ use std::fmt;
 
 use tactus_discover::{Curve, Discovery, DraftedEffect, ElementGap, FittedCurve, Point, Stair};
 use tactus_model::Array;
+use tactus_model::effect::{Draft, Law};
 
 use crate::{
     numbers::digits,
@@ -17,6 +18,12 @@ const BEFORE: &str = "base model";
 const AFTER: &str = "grown model";
 /// Size of one of three curves in a row.
 const CURVE_PX: [f64; 2] = [344.0, 240.0];
+/// Size of a draft's curve.
+const DRAFT_PX: [f64; 2] = [720.0, 300.0];
+/// Straight pieces of a drawn law.
+const CURVE_STEPS: u16 = 400;
+/// Drawn periods of a tone.
+const PERIODS: f64 = 3.0;
 /// Width between two maps.
 const GUTTER_PX: f64 = 40.0;
 /// Width of the bars' names, and of the longest bar.
@@ -76,23 +83,74 @@ pub fn free_curve(effect: &str, curve: &FittedCurve) -> Figure {
         .with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label(label))
 }
 
-/// The curve of a draft: its knots with their standard errors, and the law that passes through them.
-pub fn drafted_curve(found: &DraftedEffect) -> Figure {
+/// The curve of a draft: its knots with their standard errors, and the law that passes through them; of two covariates a line for each knot
+/// of the second one. `None` of a constant.
+pub fn drafted_curve(found: &DraftedEffect) -> Option<Figure> {
     let draft = &found.draft;
-    let covariate = draft.covariates[0];
+    let (covariate, [from, to]) = (*draft.covariates.first()?, *draft.ranges.first()?);
+    let to = match draft.law {
+        Law::Linear { slope: 0.0, .. } => return None,
+        Law::Periodic { per_unit, .. } => to.min(from + PERIODS / per_unit),
+        Law::Linear { .. }
+        | Law::Power { .. }
+        | Law::Exponential { .. }
+        | Law::Saturating { .. }
+        | Law::Threshold { .. }
+        | Law::Logarithm { .. }
+        | Law::Table { .. } => to,
+    };
     let x = along(covariate.name(), covariate.unit());
     let y = Axis::new(draft.carrier.name(), draft.carrier.unit()).from_zero();
+    let figure = Figure::new(format!("Curve of {}", draft.name), x, y).size_px(DRAFT_PX);
+    let line = |others: &[f64]| {
+        let places =
+            (0..=CURVE_STEPS).map(|step| from + (to - from) * f64::from(step) / f64::from(CURVE_STEPS));
+        let point = |at: f64| [at, draft.law.value(&[&[at], others].concat())];
+        Series::line(places.map(point).collect())
+    };
+    if let (Law::Table { at, .. }, [_, second]) = (&draft.law, &draft.covariates[..]) {
+        let seconds = at
+            .get(1)
+            .into_iter()
+            .flatten()
+            .zip([Ink::Blue, Ink::Green, Ink::Amber, Ink::Red].into_iter().cycle());
+        let lines = seconds.map(|(value, ink)| {
+            let label = format!("{} {} {}", second.name(), digits(*value, 2), second.unit());
+            line(&[*value]).ink(ink).label(label.trim_end())
+        });
+        return Some(lines.fold(figure, Figure::with));
+    }
     let known = || found.knots.iter().filter(|[.., error]| error.is_finite());
     let bars = known().map(|[at, value, error]| [*at, value - error, value + error]);
-    let dots = found.knots.iter().map(|[at, value, _]| [*at, *value]).collect();
-    let [from, to] = draft.ranges[0];
-    let places = (0..=60).map(|step| from + (to - from) * f64::from(step) / 60.0);
-    let line = Series::line(places.map(|at| [at, draft.law.value(&[at])]).collect());
-    Figure::new(format!("Curve of {}", draft.name), x, y)
-        .size_px(CURVE_PX)
-        .with(line.ink(Ink::Muted).label(draft.law.name()))
-        .with(Series::bars(bars).width_px(1.2).ink(Ink::Blue))
-        .with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label("knots"))
+    let dots: Vec<[f64; 2]> = found.knots.iter().map(|[at, value, _]| [*at, *value]).collect();
+    let figure = figure.with(line(&[]).ink(Ink::Muted).label(draft.law.name()));
+    if dots.is_empty() {
+        return Some(figure);
+    }
+    let figure = figure.with(Series::bars(bars).width_px(1.2).ink(Ink::Blue));
+    Some(figure.with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label("knots")))
+}
+
+/// The weight that a draft has for each element; `None` if it acts on all alike.
+pub fn drafted_weights(array: &Array, draft: &Draft) -> Option<Sheet> {
+    let (rows, cols) = (array.rows(), array.cols());
+    #[expect(clippy::cast_possible_truncation, reason = "a colour needs no more digits")]
+    let weights: Vec<f32> = draft.weights.as_ref()?.iter().map(|weight| *weight as f32).collect();
+    let scale = Scale::of(weights.iter().map(|weight| f64::from(*weight)));
+    let cell_px = cell_px(rows, cols);
+    let height = cell_px * rows as f64;
+    let mut sheet =
+        Sheet::new("Weights of the elements", [(cell_px * cols as f64).max(420.0), height + 48.0]);
+    let heat = HeatMap { values: &weights, rows, cols };
+    sheet.put([0.0, 0.0], &Image { heat, cell_px, scale, title: "weights".into() });
+    sheet.put([0.0, 0.0], &ElementNumbers { heat, cell_px, scale });
+    sheet.put([-12.0, height + 12.0], &ColourBar { scale, title: "weight".into() });
+    Some(sheet)
+}
+
+/// Side of an element's square on a map.
+fn cell_px(rows: usize, cols: usize) -> f64 {
+    (500.0 / cols as f64).min(300.0 / rows as f64).clamp(1.0, 44.0)
 }
 
 /// Root mean square residual of each element, of the base model and, if different, of the grown model, on one scale: in
@@ -112,7 +170,7 @@ pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Op
     let maps = [(BEFORE, &before), (AFTER, &after)];
     let is_same = before.iter().zip(&after).all(|(before, after)| before.to_bits() == after.to_bits());
     let maps = if is_same { &maps[..1] } else { &maps[..] };
-    let cell_px = (500.0 / cols as f64).min(300.0 / rows as f64).clamp(1.0, 44.0);
+    let cell_px = cell_px(rows, cols);
     let (width, height) = (cell_px * cols as f64, cell_px * rows as f64);
     let size_px = [(2.0 * width + GUTTER_PX).max(560.0), height + 70.0];
     let mut sheet = Sheet::new("Residual of the elements", size_px);

@@ -330,6 +330,7 @@ struct DraftedJson<'a> {
     nearest: Vec<NearestJson<'a>>,
     alike: &'a [String],
     closed_share: Option<f64>,
+    closed_share_se: Option<f64>,
     heldout_rms_before: f64,
     heldout_rms_after: f64,
 }
@@ -497,7 +498,8 @@ impl<'a> DraftedJson<'a> {
                 .map(|(effect, behind)| NearestJson { effect, ln_odds_behind: *behind })
                 .collect(),
             alike: &found.alike,
-            closed_share: found.closed_share,
+            closed_share: found.closed.map(|closed| closed.share),
+            closed_share_se: found.closed.and_then(|closed| closed.standard_error),
             heldout_rms_before: found.heldout_rms_before_counts,
             heldout_rms_after: found.heldout_rms_after_counts,
         }

@@ -1,6 +1,6 @@
 //! The verdict of a discovery in words.
 
-use tactus_discover::{Discovery, Floor, GivenUp, Verdict};
+use tactus_discover::{Closed, Discovery, Floor, GivenUp, Verdict};
 
 use super::active::command;
 use super::faulty;
@@ -157,6 +157,12 @@ pub(super) fn list<T: AsRef<str>>(names: impl IntoIterator<Item = T>) -> String 
 pub(super) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     format!("{} %", short(percent, usize::from((percent - 100.0).abs() < 2.0 || percent.abs() < 2.0)))
+}
+
+/// Such as `83 % +- 6 %`.
+pub fn closed(Closed { share, standard_error }: Closed) -> String {
+    let error = standard_error.map_or_else(String::new, |error| format!(" +- {}", percent(error)));
+    format!("{}{error}", percent(share))
 }
 
 /// A residual in counts and in units of the noise.

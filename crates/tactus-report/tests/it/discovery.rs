@@ -11,7 +11,7 @@ use crate::made_up::discovery::{
 };
 use serde_json::Value;
 use tactus_discover::{
-    Discovery, DraftedEffect, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, NoDraft,
+    Closed, Discovery, DraftedEffect, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, NoDraft,
     RefutedFormula, Unexplained, Verdict,
 };
 use tactus_model::Array;
@@ -167,7 +167,8 @@ fn a_draft_has_its_sentence_its_curve_and_what_speaks_for_it() {
     );
     assert_eq!(draft["knots"][1].to_string(), r#"{"at":2.0,"formula":-0.05,"se":0.002,"value":-0.05}"#);
 
-    discovery.draft = Some(Ok(Box::new(DraftedEffect { closed_share: Some(0.4), ..self::draft() })));
+    let closed = Some(Closed { share: 0.4, standard_error: None });
+    discovery.draft = Some(Ok(Box::new(DraftedEffect { closed, ..self::draft() })));
     assert!(html(&discovery).contains("badge warn\">partial<"));
     discovery.draft = Some(Err(NoDraft::Class("hardening")));
     assert!(html(&discovery).contains("None: hardening of the library explains nearly as much."));

@@ -197,7 +197,8 @@ impl Discovered {
                 p_value: found.p_value,
                 ln_odds: found.ln_odds,
                 folds: u32::try_from(found.folds)?,
-                closed_share: found.closed_share,
+                closed_share: found.closed.map(|closed| closed.share),
+                closed_share_se: found.closed.and_then(|closed| closed.standard_error),
             }),
             confirmation: None,
         }))

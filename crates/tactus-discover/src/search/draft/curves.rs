@@ -20,6 +20,8 @@ use super::grammar::Atom;
 const SHAPES: usize = 60;
 /// A constant beside a law is dropped if that costs less.
 const FREE_COST: f64 = 1.0;
+/// A held mean weighs so much more than a knot.
+const HELD: f64 = 1e3;
 /// A prior so wide that it only keeps what the data do not show at 0.
 const RIDGE: f64 = 1e-9;
 
@@ -54,27 +56,44 @@ impl Curve {
         self.values.dot(&(&self.gram * &self.values))
     }
 
+    /// The products with the mean of the knots held, if a constant as large as the curve costs nothing: recalibration takes it up, and the
+    /// errors of the knots would be those of the constant.
+    fn held_gram(&self) -> Option<DMatrix<f64>> {
+        let count = self.values.len();
+        let constant = DVector::from_element(count, self.values.amax());
+        let cost = constant.dot(&(&self.gram * &constant));
+        let most = (0..count).map(|knot| self.gram[(knot, knot)]).fold(0.0, f64::max);
+        (count > 1 && cost < FREE_COST).then(|| self.gram.add_scalar(HELD * most))
+    }
+
+    /// The constant by which the knots are nearest to a law.
+    fn shift_to(&self, places: &[f64], law: &Law) -> f64 {
+        let apart = places.iter().zip(self.values.iter()).map(|(at, value)| law.value(&[*at]) - value);
+        apart.sum::<f64>() / places.len() as f64
+    }
+
     /// What it costs to have other values.
     fn cost(&self, values: &DVector<f64>) -> f64 {
         let step = values - &self.values;
         step.dot(&(&self.gram * &step))
     }
+}
 
-    /// Covariance of linear combinations of columns.
-    fn covariance(&self, columns: &DMatrix<f64>) -> Vec<Vec<f64>> {
-        let products = columns.transpose() * &self.gram * columns;
-        let size = products.nrows();
-        let most = (0..size).map(|i| products[(i, i)]).fold(0.0, f64::max);
-        let held = products + DMatrix::identity(size, size) * (RIDGE * most);
-        let Some(inverse) = held.try_inverse() else { return Vec::new() };
-        inverse.row_iter().map(|row| row.iter().copied().collect()).collect()
-    }
+/// Covariance of linear combinations of columns with these products.
+fn covariance(gram: &DMatrix<f64>, columns: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    let products = columns.transpose() * gram * columns;
+    let size = products.nrows();
+    let most = (0..size).map(|i| products[(i, i)]).fold(0.0, f64::max);
+    let held = products + DMatrix::identity(size, size) * (RIDGE * most);
+    let Some(inverse) = held.try_inverse() else { return Vec::new() };
+    inverse.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
 /// The curve as the law that costs least, if that is at most `excused` nats; else as a table.
 pub(super) fn reduced(atom: &Atom, curve: &Curve, excused: f64) -> Reduced {
     let count = curve.values.len();
-    let all = curve.covariance(&DMatrix::identity(count, count));
+    let held_gram = curve.held_gram();
+    let all = covariance(held_gram.as_ref().unwrap_or(&curve.gram), &DMatrix::identity(count, count));
     if let Some(per_unit) = atom.per_unit {
         let law = Law::Periodic { offset: 0.0, sine: curve.values[0], cosine: curve.values[1], per_unit };
         return Reduced { law, covariance: all, knots: Vec::new() };
@@ -87,18 +106,24 @@ pub(super) fn reduced(atom: &Atom, curve: &Curve, excused: f64) -> Reduced {
         let law = Law::Linear { offset: curve.values[0], slope: 0.0 };
         return Reduced { law, covariance: all, knots: Vec::new() };
     }
-    let error = |knot: usize| all.get(knot).map_or(f64::NAN, |row| row[knot].sqrt());
-    let knots =
-        places.iter().zip(curve.values.iter()).enumerate().map(|(knot, (at, v))| [*at, *v, error(knot)]);
-    let knots = knots.collect();
+    let errors: Vec<f64> =
+        (0..count).map(|knot| all.get(knot).map_or(f64::NAN, |row| row[knot].sqrt())).collect();
+    let knots_by = |shift: f64| -> Vec<[f64; 3]> {
+        let knots = places.iter().zip(curve.values.iter()).enumerate();
+        knots.map(|(knot, (at, value))| [*at, value + shift, errors[knot]]).collect()
+    };
     let of = |(kind, shape): (Kind, f64)| Some((fitted(places, curve, kind, shape)?, kind, shape));
     let best = candidates(places).filter_map(of).min_by(|a, b| a.0.0.total_cmp(&b.0.0));
     let best = best.map(|(best, kind, shape)| refined(places, curve, kind, shape, best));
     if let Some((_, law, columns)) = best.filter(|(cost, ..)| 0.5 * cost <= excused) {
-        return Reduced { covariance: curve.covariance(&columns), law, knots };
+        let shift = if held_gram.is_some() { curve.shift_to(places, &law) } else { 0.0 };
+        return Reduced { covariance: covariance(&curve.gram, &columns), law, knots: knots_by(shift) };
     }
-    let law = Law::Table { at: vec![places.clone()], values: curve.values.iter().copied().collect() };
-    Reduced { law, covariance: all, knots }
+    // Of curves that differ by a constant that nothing shows, the one that begins at 0.
+    let shift = if held_gram.is_some() { -curve.values[0] } else { 0.0 };
+    let values = curve.values.iter().map(|value| value + shift).collect();
+    let law = Law::Table { at: vec![places.clone()], values };
+    Reduced { law, covariance: all, knots: knots_by(shift) }
 }
 
 /// Laws with a shape, for covariates with these knots. A straight line comes first: of laws that cost the same the first is taken.

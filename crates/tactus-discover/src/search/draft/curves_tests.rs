@@ -2,7 +2,7 @@ use nalgebra::{DMatrix, DVector};
 use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, Law, When};
 
-use super::{Curve, reduced};
+use super::{Curve, Reduced, reduced};
 use crate::search::draft::grammar::Atom;
 
 const AT: [f64; 7] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
@@ -56,8 +56,26 @@ fn a_constant_that_costs_nothing_is_dropped() {
     let projection = DMatrix::identity(7, 7) - DMatrix::from_element(7, 7, 1.0 / 7.0);
     one.gram = &projection * one.gram * &projection;
     one.values.add_scalar_mut(0.37);
-    let found = reduced(&atom(), &one, 5.0).law;
+    let Reduced { law: found, knots, .. } = reduced(&atom(), &one, 5.0);
+    // The knots lie on the law, with the errors of what differs between them.
+    for [at, value, error] in knots {
+        assert!((value - found.value(&[at])).abs() < 0.01 && error < 0.003, "{at}: {value} +- {error}");
+    }
     let rise = |law: &Law| law.value(&[0.6]) - law.value(&[0.0]);
     assert!((rise(&found) - rise(&law)).abs() < 0.01, "{found:?}");
     assert!(!matches!(found, Law::Table { .. }), "{found:?}");
+}
+
+#[test]
+fn a_table_with_a_constant_that_nothing_shows_begins_at_nothing() {
+    let mut bump = Curve {
+        values: DVector::from_column_slice(&[0.5, 0.5, 3.5, 0.5, -2.5, 0.5, 0.5]),
+        ..curve(&Law::Linear { offset: 0.0, slope: 0.0 }, 0.05)
+    };
+    let projection = DMatrix::identity(7, 7) - DMatrix::from_element(7, 7, 1.0 / 7.0);
+    bump.gram = &projection * bump.gram * &projection;
+    let found = reduced(&atom(), &bump, 5.0);
+    let Law::Table { values, .. } = found.law else { panic!("{:?}", found.law) };
+    assert_eq!(values, [0.0, 0.0, 3.0, 0.0, -3.0, 0.0, 0.0]);
+    assert!(found.knots.iter().all(|[_, _, error]| *error < 0.06), "{:?}", found.knots);
 }

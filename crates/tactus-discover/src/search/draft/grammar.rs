@@ -9,7 +9,7 @@ use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, When};
 
 use super::sight::{OF_ELEMENTS, Sight};
-use super::{KNOTS, KNOTS_OF_TWO};
+use super::{KNOTS, KNOTS_OF_EVERY, KNOTS_OF_SECOND};
 use crate::fit::{Fitted, Problem};
 use crate::search::tones::{Point, clearest};
 
@@ -32,6 +32,9 @@ pub(super) struct Atom {
     /// From how many alternatives the residual picked it.
     pub(super) among: f64,
 }
+
+/// A carrier with when it acts and a covariate.
+pub(super) type Acting = (Carrier, When, Covariate);
 
 /// Carriers with when they act and what on.
 type Group = (Carrier, When, &'static [Covariate]);
@@ -170,8 +173,9 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
             covariates.iter().map(|covariate| (*carrier, *when, *covariate))
         })
     };
-    let smooth = |(carrier, when, covariate): (Carrier, When, Covariate), knots: usize, of_elements| {
-        let knots = sight.knots(covariate, when, knots);
+    let smooth = |(carrier, when, covariate): Acting, knots: usize, of_elements| {
+        let knots = if carrier == Carrier::EveryElement { KNOTS_OF_EVERY.max(knots) } else { knots };
+        let knots = sight.knots((carrier, when, covariate), knots);
         // A weight for each element may be of something that does not vary.
         let is_there = knots.len() > 1 || of_elements && !knots.is_empty();
         is_there.then(|| Atom { of_elements, ..Atom::of(carrier, when, covariate, knots) })
@@ -180,7 +184,7 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
     found.extend(each(IN_CONTACT).chain(each(ELSEWHERE)).filter_map(|one| smooth(one, KNOTS, false)));
     found.extend(each(OF_EACH).filter_map(|one| smooth(one, OF_ELEMENTS, true)));
     found.extend(each(CONSTANT).flat_map(|(carrier, when, covariate)| {
-        let place = sight.knots(covariate, when, 1);
+        let place = sight.knots((carrier, when, covariate), 1);
         let constant = (!place.is_empty()).then(|| Atom::of(carrier, when, covariate, place));
         let of_elements = constant.clone().map(|atom| Atom { of_elements: true, ..atom });
         [constant, of_elements].into_iter().flatten()
@@ -219,10 +223,11 @@ pub(super) fn with_seconds<'a>(best: &'a Atom, sight: &'a Sight) -> impl Iterato
     seconds.sort_unstable();
     seconds.dedup();
     seconds.into_iter().filter_map(move |second| {
-        let knots = [own, second].map(|one| sight.knots(one, best.when, KNOTS_OF_TWO));
-        knots.iter().all(|knots| knots.len() > 1).then(|| Atom {
+        let of_second = sight.knots((best.carrier, best.when, second), KNOTS_OF_SECOND);
+        let of_own = best.knots.first().filter(|own| own.len() > 1)?;
+        (of_second.len() > 1).then(|| Atom {
             covariates: vec![own, second],
-            knots: knots.into(),
+            knots: vec![of_own.clone(), of_second],
             ..best.clone()
         })
     })

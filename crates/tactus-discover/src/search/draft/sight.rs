@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tactus_model::effect::{Carrier, Draft, Law, When};
 use tactus_model::{Covariate, Seen, Trace};
 
-use super::grammar::Atom;
+use super::grammar::{Acting, Atom};
 use crate::data::DiscoverError;
 use crate::fit::{Direction, Fitted, Free, Grams, Problem, Term, hat};
 
@@ -96,8 +96,8 @@ impl Sight {
     }
 
     /// Places of knots: quantiles of the covariate's values.
-    pub(super) fn knots(&self, covariate: Covariate, when: When, count: usize) -> Vec<f64> {
-        let mut values = self.values(covariate, when);
+    pub(super) fn knots(&self, of: Acting, count: usize) -> Vec<f64> {
+        let mut values = self.values(of);
         values.sort_by(f64::total_cmp);
         let (Some(least), Some(most)) = (values.first().copied(), values.last().copied()) else {
             return Vec::new();
@@ -115,16 +115,16 @@ impl Sight {
     }
 
     /// The least and the greatest value of a covariate.
-    pub(super) fn range(&self, covariate: Covariate, when: When) -> [f64; 2] {
-        let values = self.values(covariate, when);
+    pub(super) fn range(&self, of: Acting) -> [f64; 2] {
+        let values = self.values(of);
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if least <= most { [least, most] } else { [0.0, 0.0] }
     }
 
-    /// The values of a covariate at the bins at which a draft acts; of one that differs from element to element those of readings with a
-    /// signal.
-    fn values(&self, covariate: Covariate, when: When) -> Vec<f64> {
+    /// The values of a covariate at the bins at which a draft acts. Of one that differs from element to element they are those of readings
+    /// with a signal, unless the carrier acts on the others as well.
+    fn values(&self, (carrier, when, covariate): Acting) -> Vec<f64> {
         let bins = (0..self.traces.len()).filter(|bin| when.is_now(&self.traces[*bin]));
         if !covariate.is_of_element() {
             return bins
@@ -135,9 +135,8 @@ impl Sight {
         let of_bin = |bin: usize| {
             let signal_mm = &self.signal_mm[bin * self.elements..(bin + 1) * self.elements];
             let largest = signal_mm.iter().copied().fold(0.0, f64::max);
-            let is_loud = move |element: &usize| {
-                covariate == Covariate::Counts || signal_mm[*element] > LOUD_SHARE * largest
-            };
+            let is_of_all = matches!(carrier, Carrier::EveryElement | Carrier::Counts);
+            let is_loud = move |element: &usize| is_of_all || signal_mm[*element] > LOUD_SHARE * largest;
             let value = move |element| covariate.value(self.seen(bin), element);
             (0..self.elements).filter(is_loud).filter_map(value)
         };

@@ -9,7 +9,7 @@ use super::sight::Sight;
 /// The draft of an atom with this law.
 pub(super) fn named(sight: &Sight, atom: &Atom, law: Law, name: &str) -> Draft {
     let ranges: Vec<[f64; 2]> =
-        atom.covariates.iter().map(|covariate| sight.range(*covariate, atom.when)).collect();
+        atom.covariates.iter().map(|one| sight.range((atom.carrier, atom.when, *one))).collect();
     let mut draft = Draft {
         name: name.to_owned(),
         sentence: String::new(),

@@ -1,7 +1,7 @@
 //! Synthetic discoveries with known numbers.
 
 use tactus_discover::{
-    AddedEffect, BaseModel, Because, Contest, Curve, Discovery, DraftedEffect, ElementGap, Estimated,
+    AddedEffect, BaseModel, Because, Closed, Contest, Curve, Discovery, DraftedEffect, ElementGap, Estimated,
     FaultKind, FaultyElement, Final, Floor, Gap, GivenUp, GlobalTest, Inclusion, LeftOut, Level,
     NextExperiment, NotShown, OpenQuestion, Plan, Point, Rivalry, Round, Split, Stair, Structured,
     TriedEffect, Unexplained, Verdict,
@@ -48,7 +48,7 @@ pub(crate) fn draft() -> DraftedEffect {
         folds: 5,
         nearest: vec![("saturation", 76.2), ("hardening", 98.0)],
         alike: vec!["depth in contact, by temperature".into()],
-        closed_share: Some(0.93),
+        closed: Some(Closed { share: 0.93, standard_error: Some(0.04) }),
         heldout_rms_before_counts: 3.45,
         heldout_rms_after_counts: 2.11,
         base: base(),

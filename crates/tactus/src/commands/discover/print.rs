@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use tactus_calibrate::Estimate;
 use tactus_discover::{AddedEffect, DraftedEffect, Estimated, FittedCurve, Level};
 use tactus_report::discovery::{
-    AmbiguousEffect, DiscoveryReport, Proposal, command, draft_status, in_words, not_proposed, not_shown,
-    proposals,
+    AmbiguousEffect, DiscoveryReport, Proposal, closed, command, draft_status, in_words, not_proposed,
+    not_shown, proposals,
 };
 
 use crate::commands::calibrate::{estimate, faulty};
@@ -177,9 +177,9 @@ fn probability(value: f64) -> String {
 
 /// A draft in two sentences.
 fn drafted(found: &DraftedEffect) -> String {
-    let closes = found.closed_share.map_or_else(
+    let closes = found.closed.map_or_else(
         || "Nothing is left on held-out presses".to_owned(),
-        |share| format!("On held-out presses it closes {:.0} % of what was left", 100.0 * share),
+        |of_left| format!("On held-out presses it closes {} of what was left", closed(of_left)),
     );
     let DraftedEffect { draft, .. } = found;
     format!("Drafted {} ({}): {}. {closes}.", draft.name, draft_status(found).name(), draft.sentence)

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use tactus_discover::{Confirmation, DiscoverError, Known};
 use tactus_model::effect::Definition;
+use tactus_report::discovery::closed;
 use tactus_schema::DraftFile;
 use tactus_schema::draft::{DraftConfirmation, DraftStatus};
 
@@ -35,7 +36,8 @@ pub(super) fn settle(discovered: &Discovered, new: &[PathBuf]) -> anyhow::Result
         data: measured.data.iter().map(|source| (source.id.clone(), source.sha256.clone())).collect(),
         strength: told.strength,
         strength_se: told.strength_se,
-        closed_share: told.closed_share,
+        closed_share: told.closed.map(|closed| closed.share),
+        closed_share_se: told.closed.and_then(|closed| closed.standard_error),
     };
     Ok(Some(Settled {
         in_words: in_words(&file.draft.name, status, &told),
@@ -45,11 +47,11 @@ pub(super) fn settle(discovered: &Discovered, new: &[PathBuf]) -> anyhow::Result
 }
 
 fn in_words(name: &str, status: DraftStatus, told: &Confirmation) -> String {
-    let Confirmation { strength, strength_se, closed_share, .. } = told;
+    let Confirmation { strength, strength_se, closed: of_left, .. } = told;
     let error = strength_se.map_or_else(String::new, |error| format!(" +- {error:.3}"));
-    let closes = closed_share.map_or_else(
+    let closes = of_left.map_or_else(
         || "nothing is left there without it".to_owned(),
-        |share| format!("it closes {:.0} % of what is left there without it", 100.0 * share),
+        |of_left| format!("it closes {} of what is left there without it", closed(of_left)),
     );
     format!(
         "{name} is {}: in the new run its strength is {strength:.3}{error} of the drafted one, and {closes}.",

@@ -1,0 +1,68 @@
+//! How much of what one model leaves another model closes, on held-out presses.
+//!
+//! With the residuals `b` and `a` of the two models on the same readings,
+//!
+//! ```text
+//! E = mean of b^2 - a^2                       what is closed: the noise cancels
+//! L = mean of a(t) a(t + lag)                 what the second model leaves, at lags at which the noise has long forgotten itself; or what of
+//!                                             the mean of its squares is certain, if that is more
+//! share = E / (E + L)
+//! ```
+//!
+//! A gap far below the noise is measured by this far better than by mean squares less that of the noise: of these the noise's own error may be
+//! as large as the gap. The standard error is that of a jackknife over presses.
+
+use super::structured::{Readings, Sums, jackknife};
+use crate::numbers::student_95;
+
+/// The share of what one model leaves that another closes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Closed {
+    /// At most 1; below 0 if the other model is worse.
+    pub share: f64,
+    /// Its standard error, from the scatter of presses; `None` of fewer than three.
+    pub standard_error: Option<f64>,
+}
+
+/// Sums over a press: of what is closed, of what lasts in the second residual, and of its squares less the noise's.
+type OfPress = [Sums; 3];
+
+/// What the second model closes of what the first one leaves, among the readings that `among` selects; `None` if nothing is left or closed.
+pub(super) fn closed([before, after]: [&Readings<'_>; 2], among: impl Fn(usize) -> bool) -> Option<Closed> {
+    let of_press = |press| -> OfPress {
+        let lasting = after.late_sums(press, &among);
+        let ([_, before], [_, after]) = (before.sums(press, &among), after.sums(press, &among));
+        [[before[0] - after[0], after[1]], lasting, after]
+    };
+    let presses: Vec<OfPress> = after.presses.iter().map(of_press).collect();
+    let squares: Vec<Sums> = presses.iter().map(|of| of[2]).filter(|[_, count]| *count > 0.0).collect();
+    let (left, error) = jackknife(&squares)?;
+    let certain = left - student_95(squares.len()) * after.with_noise(left, error);
+    let share = |of: &[OfPress]| -> Option<f64> {
+        let mean = |which: usize| -> f64 {
+            let [sum, count] = of.iter().fold([0.0; 2], |sums, of| [0, 1].map(|k| sums[k] + of[which][k]));
+            if count > 0.0 { sum / count } else { 0.0 }
+        };
+        let (explained, left) = (mean(0), mean(1).max(certain).max(0.0));
+        let all = explained + left;
+        (all > 0.0).then(|| explained / all)
+    };
+    let whole = share(&presses)?;
+    let without = |press: usize| {
+        let mut others = presses.clone();
+        others.remove(press);
+        share(&others)
+    };
+    let parts: Option<Vec<f64>> = (0..presses.len()).map(without).collect();
+    let standard_error = parts.filter(|parts| parts.len() >= 3).map(|parts| {
+        let count = parts.len() as f64;
+        let mean = parts.iter().sum::<f64>() / count;
+        let spread: f64 = parts.iter().map(|one| (one - mean).powi(2)).sum();
+        (spread * (count - 1.0) / count).sqrt()
+    });
+    Some(Closed { share: whole, standard_error })
+}
+
+#[cfg(test)]
+#[path = "closed_tests.rs"]
+mod tests;

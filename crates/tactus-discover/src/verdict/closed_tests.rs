@@ -1,0 +1,73 @@
+use std::ops::Range;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+
+const PRESSES: usize = 40;
+const FRAMES: usize = 50;
+const ELEMENTS: usize = 12;
+
+/// Residuals before and after a model that closes a share of a structure of this size, in white noise of 1 count.
+fn residuals(rms: f64, closes: f64, seed: u64) -> [Vec<f32>; 2] {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut both = [Vec::new(), Vec::new()];
+    for _ in 0..PRESSES {
+        let [explained, left] = [closes, 1.0 - closes].map(|share: f64| {
+            let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+            side * rms * share.sqrt()
+        });
+        for _ in 0..FRAMES * ELEMENTS {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            #[expect(clippy::cast_possible_truncation, reason = "residuals are stored so")]
+            [explained + left, left]
+                .iter()
+                .zip(&mut both)
+                .for_each(|(of, into)| into.push((of + noise) as f32));
+        }
+    }
+    both
+}
+
+/// The share that is seen if the noise is believed to be of this size.
+fn seen(residuals: &[Vec<f32>; 2], noise: f64) -> Closed {
+    let presses: Vec<Range<usize>> = (0..PRESSES).map(|press| press * FRAMES..(press + 1) * FRAMES).collect();
+    let (noise_counts, unit_counts) = ([noise; ELEMENTS], [1.0; ELEMENTS]);
+    let readings = |residual| Readings {
+        elements: ELEMENTS,
+        residual,
+        presses: &presses,
+        noise_counts: &noise_counts,
+        unit_counts: &unit_counts,
+        lag: 1,
+        correlation: 0.0,
+        late_correlation: 0.0,
+        freedom: 500.0,
+    };
+    closed([&readings(&residuals[0]), &readings(&residuals[1])], |_| true).unwrap()
+}
+
+#[test]
+fn the_share_of_a_gap_far_below_the_noise_is_seen_though_the_size_of_the_noise_is_not_exact() {
+    for (closes, seed) in [(1.0, 1), (0.8, 2), (0.5, 3), (0.2, 4)] {
+        for noise in [0.98, 1.0, 1.02] {
+            let Closed { share, standard_error } = seen(&residuals(0.2, closes, seed), noise);
+            let error = standard_error.unwrap();
+            assert!((share - closes).abs() < (4.0 * error).max(0.12), "{closes} {noise}: {share} +- {error}");
+            assert!(error < 0.2, "{closes} {noise}: {error}");
+        }
+    }
+}
+
+#[test]
+fn what_changes_too_fast_to_last_counts_once_it_is_certain() {
+    let [before, mut after] = residuals(2.0, 1.0, 5);
+    // What is left turns its sign from frame to frame.
+    for (place, value) in after.iter_mut().enumerate() {
+        *value += if (place / ELEMENTS).is_multiple_of(2) { 2.0 } else { -2.0 };
+    }
+    let Closed { share, .. } = seen(&[before, after], 1.0);
+    assert!(share < 0.6, "{share}");
+}
