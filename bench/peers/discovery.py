@@ -139,7 +139,7 @@ class Data:
         self.held, self.released = since(touched, self.t), since(~touched, self.t)
         self.past = np.maximum.accumulate(self.base, axis=0)
         self.at = np.stack([x - x.mean(), y - y.mean()], axis=1)
-        self.z, self.counts, self.pitch = z, counts.astype(float), rig["pitch_mm"]
+        self.z, self.counts, self.pitch = z, counts.astype(float), rig["col_centres_mm"][1] - rig["col_centres_mm"][0]
         self.height = np.where(touched, 0.0, z - np.quantile(z[touched], 0.98)).clip(0)
         known = "temperature_c" in table.column_names and column("temperature_c").astype(float)
         self.temperature = known if known is not False and np.isfinite(known).all() else None

@@ -41,8 +41,8 @@ const TRIED_MAX: usize = 3;
 /// Knots of the curve of a covariate, and of a second one beside it.
 const KNOTS: usize = 7;
 const KNOTS_OF_SECOND: usize = 4;
-/// Of what acts on every element, near or far: the range of distances is wide.
-const KNOTS_OF_EVERY: usize = 12;
+/// By distance of what acts on every element, near or far: the range is wide.
+const KNOTS_OF_DISTANCE: usize = 12;
 /// Folds of blocks in which the same atom should come first.
 const FOLDS: usize = 5;
 /// Logarithm of the odds by which a draft must be ahead of every class.

@@ -9,7 +9,7 @@ use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, When};
 
 use super::sight::{OF_ELEMENTS, Sight};
-use super::{KNOTS, KNOTS_OF_EVERY, KNOTS_OF_SECOND};
+use super::{KNOTS, KNOTS_OF_DISTANCE, KNOTS_OF_SECOND};
 use crate::fit::{Fitted, Problem};
 use crate::search::tones::{Point, clearest};
 
@@ -174,7 +174,8 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
         })
     };
     let smooth = |(carrier, when, covariate): Acting, knots: usize, of_elements| {
-        let knots = if carrier == Carrier::EveryElement { KNOTS_OF_EVERY.max(knots) } else { knots };
+        let is_wide = covariate == Covariate::Distance && carrier == Carrier::EveryElement;
+        let knots = if is_wide { KNOTS_OF_DISTANCE } else { knots };
         let knots = sight.knots((carrier, when, covariate), knots);
         // A weight for each element may be of something that does not vary.
         let is_there = knots.len() > 1 || of_elements && !knots.is_empty();
