@@ -82,6 +82,9 @@ pub struct ResponseFit {
     pub shared_quadratic_per_mm: Option<Estimate>,
     /// Root mean square of the residuals of the selected form in units of the noise: 1 if the form holds.
     pub residual_in_noise: f64,
+    /// Mean of the elements' sensitivities. The errors that all elements share, of the sensor's surface, pose and common curvature,
+    /// do not average out: they are the greater part of its error.
+    pub mean_sensitivity_counts_per_mm: Estimate,
     /// The elements' responses by index, without faulty elements and those without a press at their centre.
     pub elements: Vec<ElementResponse>,
     /// Responses of the cross-wired elements, from presses at the centres of the elements whose signals they give. No other
@@ -113,6 +116,8 @@ pub struct ElementResponse {
     pub quadratic: Option<[Estimate; 2]>,
     /// `s_e` of the selected form; its error includes those of the sensor's pose and surface.
     pub sensitivity_counts_per_mm: Estimate,
+    /// The sensitivity minus the mean of all elements; its error is without what they share. `None` of cross-wired elements.
+    pub above_mean_counts_per_mm: Option<Estimate>,
     /// `k` of the selected form; 0 if it is linear.
     pub quadratic_per_mm: Estimate,
 }
@@ -194,6 +199,7 @@ pub(crate) fn respond(
     let (own_covariance, by_place_wanted) = (wanted.expanded_covariance(), by_place(wanted));
     let covariance = &own_covariance + moved_by(&by_place_wanted);
     let count = elements.len();
+    let mean = MeanSensitivity::of(wanted, &covariance);
     let responses = elements.iter().enumerate().map(|(index, element)| {
         let [s, k] = wanted.response(index);
         let of_element = here.iter().filter(|group| group.element == *element);
@@ -205,6 +211,7 @@ pub(crate) fn respond(
             linear_counts_per_mm: linear.sensitivity(index),
             quadratic: own.as_ref().map(|own| [own.sensitivity(index), own.curvature(index)]),
             sensitivity_counts_per_mm: Estimate::new(s, covariance[(index, index)]),
+            above_mean_counts_per_mm: Some(mean.difference(index, s, covariance[(index, index)])),
             quadratic_per_mm: Estimate::new(k, covariance[(count + index, count + index)]),
         }
     });
@@ -228,6 +235,7 @@ pub(crate) fn respond(
             Estimate::new(shared.response(0)[1], variance)
         }),
         residual_in_noise: wanted.residual_in_noise(),
+        mean_sensitivity_counts_per_mm: Estimate::new(mean.value, mean.variance),
         elements: responses.collect(),
         cross_wired: cross_wired(declared, readings, health, place, wanted),
     };
@@ -241,6 +249,30 @@ pub(crate) fn respond(
         by_place: by_place_wanted,
     };
     Ok((response, gains))
+}
+
+/// The mean of all sensitivities.
+struct MeanSensitivity {
+    value: f64,
+    variance: f64,
+    /// Its covariance with each sensitivity.
+    with_each: Vec<f64>,
+}
+
+impl MeanSensitivity {
+    /// `covariance` is that of all `s`, then all `k`.
+    fn of(fitted: &FittedForm, covariance: &DMatrix<f64>) -> Self {
+        let count = fitted.elements.len();
+        let value = (0..count).map(|index| fitted.response(index)[0]).sum::<f64>() / count as f64;
+        let with = |index| (0..count).map(|other| covariance[(index, other)]).sum::<f64>() / count as f64;
+        let with_each: Vec<f64> = (0..count).map(with).collect();
+        Self { value, variance: with_each.iter().sum::<f64>() / count as f64, with_each }
+    }
+
+    /// The difference of one sensitivity to it.
+    fn difference(&self, index: usize, value: f64, variance: f64) -> Estimate {
+        Estimate::new(value - self.value, variance - 2.0 * self.with_each[index] + self.variance)
+    }
 }
 
 /// Responses of the cross-wired elements, with the curvature of the sound ones.
@@ -266,6 +298,7 @@ fn cross_wired(
         linear_counts_per_mm: fitted.sensitivity(index),
         quadratic: None,
         sensitivity_counts_per_mm: fitted.sensitivity(index),
+        above_mean_counts_per_mm: None,
         quadratic_per_mm: Estimate::new(k, 0.0),
     });
     responses.collect()

@@ -50,6 +50,24 @@ fn one_curvature_is_found_as_one() {
     }
 }
 
+/// A surface that is off moves all sensitivities to one side: the mean carries that error, and the differences do not.
+#[test]
+fn the_error_that_elements_share_is_told_apart_from_their_own() {
+    let (fit, gains) = responded(curved(2, |_| 0.15));
+    let mean = fit.mean_sensitivity_counts_per_mm;
+    let true_mean = gains.iter().sum::<f64>() / gains.len() as f64;
+    assert!((mean.value - true_mean).abs() < 4.0 * mean.standard_error, "{mean:?} {true_mean}");
+    let (mut sum, mut inside) = (0.0, 0);
+    for one in &fit.elements {
+        let (whole, own) = (one.sensitivity_counts_per_mm, one.above_mean_counts_per_mm.unwrap());
+        assert!((own.value - (whole.value - mean.value)).abs() < 1e-9);
+        assert!(own.standard_error < whole.standard_error, "{one:?}");
+        sum += own.value;
+        inside += usize::from(own.covers(gains[one.element] - true_mean));
+    }
+    assert!(sum.abs() < 1e-6 && inside >= 42, "{sum} {inside} of {}", fit.elements.len());
+}
+
 #[test]
 fn curvatures_that_differ_are_found_to() {
     let (fit, _) = responded(curved(3, |element| if element % 2 == 0 { 0.1 } else { 0.5 }));

@@ -12,6 +12,9 @@ use crate::{
 /// Residuals beyond this many times the noise show that the model does not hold.
 const MISFIT: f64 = 1.5;
 
+/// Share of the spread below which a departure is not worth a warning, however certain it is.
+const NEGLIGIBLE_SHARE: f64 = 0.005;
+
 /// Remarks in the order of the calibration's steps.
 #[derive(Default)]
 struct Remarks {
@@ -49,7 +52,7 @@ impl Remarks {
     fn data(&mut self, declared: &Declared, readings: &Readings) {
         let unrested = readings.presses.iter().filter(|press| press.rest.is_none()).count();
         if unrested > 0 {
-            self.warnings
+            self.missing
                 .push(format!("{unrested} presses have no reading at rest before them and are left out."));
         }
         if readings.frames_left_out > 0 {
@@ -60,7 +63,7 @@ impl Remarks {
         }
         let unknown = readings.presses.iter().filter(|press| declared.indenter(press).is_none()).count();
         if unknown > 0 {
-            self.warnings
+            self.missing
                 .push(format!("{unknown} presses are left out: their tool is not in the rig's description."));
         }
     }
@@ -178,7 +181,9 @@ impl Remarks {
             );
         }
         for covering in &thickness.coverings {
-            if covering.p_value.is_some_and(|p_value| p_value < IMPLAUSIBLE) {
+            if covering.p_value.is_some_and(|p_value| p_value < IMPLAUSIBLE)
+                && covering.range_mm > NEGLIGIBLE_SHARE * covering.sigma_mm.value
+            {
                 self.warnings.push(format!(
                     "Under the covering of {:.3} mm the spread changes with depth by {:.3} mm, more than its errors explain.",
                     covering.covering_mm, covering.range_mm
@@ -197,6 +202,7 @@ impl Remarks {
         }
         if let Some(line) = &thickness.linear
             && line.p_value.is_some_and(|p_value| p_value < IMPLAUSIBLE)
+            && thickness.coverings.iter().any(|one| line.rms_mm > NEGLIGIBLE_SHARE * one.sigma_mm.value)
         {
             self.warnings.push(format!(
                 "Spread against thickness is no straight line: points lie {:.3} mm rms off it, more than their errors explain. \

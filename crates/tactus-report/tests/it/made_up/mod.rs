@@ -68,6 +68,7 @@ pub(crate) fn whole() -> Calibration {
             ],
             shared_quadratic_per_mm: Some(sure(CURVATURE_PER_MM, 0.001)),
             residual_in_noise: 1.0,
+            mean_sensitivity_counts_per_mm: sure(1023.5, 1.0),
             cross_wired: Vec::new(),
             elements: sound.map(element).collect(),
         }),
@@ -142,6 +143,7 @@ fn element(element: usize) -> ElementResponse {
         linear_counts_per_mm: sure(1.08 * s, 13.2),
         quadratic: Some([sure(s, 1.3), sure(CURVATURE_PER_MM, 0.007)]),
         sensitivity_counts_per_mm: sure(s, 1.3),
+        above_mean_counts_per_mm: Some(sure(s - 1023.5, 0.8)),
         quadratic_per_mm: sure(CURVATURE_PER_MM, 0.001),
     }
 }
