@@ -26,5 +26,5 @@ mod run;
 pub use page::render_html;
 pub use run::{
     Baseline, DwellSummary, ElementCurve, FrameLoss, Intervals, LoggedEvent, PressSummary, ReportError,
-    ResponseCurves, RunReport, RunSummary, Timing, Trace, UnresponsiveElement, run_report,
+    RespondsTo, ResponseCurves, RunReport, RunSummary, Timing, Trace, UnresponsiveElement, run_report,
 };

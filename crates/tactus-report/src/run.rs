@@ -14,7 +14,7 @@ use tactus_record::{Completeness, RecordError, Timeline};
 pub use frames::{FrameLoss, Intervals, Timing, Trace};
 pub use log::LoggedEvent;
 pub use presses::{Baseline, DwellSummary, PressSummary};
-pub use response::{ElementCurve, ResponseCurves, UnresponsiveElement};
+pub use response::{ElementCurve, RespondsTo, ResponseCurves, UnresponsiveElement};
 pub use summary::RunSummary;
 
 use frames::FrameStatistics;

@@ -7,7 +7,7 @@ use crate::{
     markup::Text,
     numbers::{plural, with_error},
     plot::{Axis, Figure, Ink, Series, number},
-    run::ResponseCurves,
+    run::{RespondsTo, ResponseCurves},
 };
 
 /// Points along a fitted curve.
@@ -78,8 +78,14 @@ fn unresponsive(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::R
     if elements(response) < 2 && response.unresponsive.is_empty() {
         return Ok(());
     }
+    untold(f, response)?;
     if response.unresponsive.is_empty() {
-        return writeln!(f, "<p>Every pressed element responds to its own press.</p>");
+        let told = elements(response) - response.untold.len();
+        return match (told, response.untold.is_empty()) {
+            (0, _) => Ok(()),
+            (_, true) => writeln!(f, "<p>Every pressed element responds to its own press.</p>"),
+            (_, false) => writeln!(f, "<p>Each other pressed element responds to its own press.</p>"),
+        };
     }
     writeln!(
         f,
@@ -88,8 +94,11 @@ fn unresponsive(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::R
     writeln!(f, "<thead><tr><th>element</th><th>(row, col)</th><th>responds to</th></tr></thead>")?;
     for unresponsive in &response.unresponsive {
         let [row, col] = unresponsive.curve.place;
-        let other =
-            unresponsive.answers_to.map_or_else(|| "nothing".into(), |[row, col]| format!("({row}, {col})"));
+        let other = match unresponsive.answers_to {
+            RespondsTo::Element([row, col]) => format!("({row}, {col})"),
+            RespondsTo::Elsewhere => "a place that was not pressed".into(),
+            RespondsTo::Nothing => "nothing".into(),
+        };
         writeln!(
             f,
             "<tr><td>{}</td><td>({row}, {col})</td><td>{other}</td></tr>",
@@ -97,6 +106,19 @@ fn unresponsive(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::R
         )?;
     }
     writeln!(f, "</table>")
+}
+
+/// Names the elements of which the presses show too little.
+fn untold(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {
+    if response.untold.is_empty() {
+        return Ok(());
+    }
+    let elements: Vec<String> = response.untold.iter().map(ToString::to_string).collect();
+    writeln!(
+        f,
+        "<p>Too few of their neighbours were pressed as deep to tell whether these elements respond to their own press: {}.</p>",
+        elements.join(", ")
+    )
 }
 
 fn spread(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {

@@ -11,6 +11,10 @@ use crate::fit::Polynomial;
 const DEAD_SHARE: f64 = 0.25;
 /// An element responds to another's press if its reading at its own press is less than this share of its greatest.
 const OWN_SHARE: f64 = 0.95;
+/// Presses at most this many rows and columns away show whether an element responds to its own.
+const NEAR: usize = 2;
+/// Elements that it takes to know which share of its own press an element reads at a neighbouring one.
+const SHARES_MIN: usize = 4;
 /// Depths are compared in multiples of this.
 const DEPTH_STEP_MM: f64 = 1e-3;
 
@@ -21,6 +25,9 @@ pub struct ResponseCurves {
     pub curves: Vec<ElementCurve>,
     /// The other elements, in order of their index; they take part in no fit.
     pub unresponsive: Vec<UnresponsiveElement>,
+    /// Elements among the curves of which these presses cannot show whether they respond to their own press, sorted: none of their
+    /// neighbours was pressed as deep.
+    pub untold: Vec<usize>,
     /// Mean of the curves at each depth that at least half of them have: `[mm, counts]`.
     pub mean: Vec<[f64; 2]>,
     /// Line fitted to the mean.
@@ -49,8 +56,19 @@ pub struct ElementCurve {
 pub struct UnresponsiveElement {
     /// Its readings at its own press.
     pub curve: ElementCurve,
-    /// Row and column of the element at whose press it reads most; `None` if it responds to no press.
-    pub answers_to: Option<[usize; 2]>,
+    /// To which press it responds instead.
+    pub answers_to: RespondsTo,
+}
+
+/// To what an element responds instead of its own press.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RespondsTo {
+    /// A press at another element, with this row and column.
+    Element([usize; 2]),
+    /// A place that was not pressed: it reads too much at its neighbours' presses.
+    Elsewhere,
+    /// No press.
+    Nothing,
 }
 
 impl ResponseCurves {
@@ -62,14 +80,18 @@ impl ResponseCurves {
         if curves.is_empty() {
             return None;
         }
-        let answers = DeepestReadings::of(presses);
+        let readings = CentreReadings::of(presses, cols);
         let mut seen = BTreeSet::new();
+        let mut untold = BTreeSet::new();
         let mut unresponsive: Vec<UnresponsiveElement> = Vec::new();
         for curve in &curves {
-            let answers_to = match answers.of_element(curve.element) {
-                RespondsAt::Own => continue,
-                RespondsAt::To(other) => Some([other / cols, other % cols]),
-                RespondsAt::Nowhere => None,
+            let answers_to = match readings.verdict(curve.element) {
+                OwnPress::Responds => continue,
+                OwnPress::Untold => {
+                    untold.insert(curve.element);
+                    continue;
+                }
+                OwnPress::Not(answers_to) => answers_to,
             };
             if seen.insert(curve.element) {
                 unresponsive.push(UnresponsiveElement { curve: curve.clone(), answers_to });
@@ -85,6 +107,7 @@ impl ResponseCurves {
             mean,
             curves,
             unresponsive,
+            untold: untold.into_iter().collect(),
         })
     }
 
@@ -120,54 +143,123 @@ impl ElementCurve {
     }
 }
 
-/// Readings of all elements at the deepest dwell of each press at a centre.
-struct DeepestReadings<'a> {
-    /// Depth and rises, by pressed element.
-    deepest: BTreeMap<usize, (i64, &'a [f32])>,
+/// Readings of all elements in the presses at centres: by depth, then by pressed element.
+struct CentreReadings<'a> {
+    by_depth: BTreeMap<i64, BTreeMap<usize, &'a [f32]>>,
+    cols: usize,
+    /// Median of the elements' readings at the deepest dwell of their own press.
     median_own: f64,
+    /// Shares of its own press that an element reads at another: the median of the elements, by depth and rows and columns between them.
+    shares: BTreeMap<(i64, [usize; 2]), f64>,
 }
 
-impl<'a> DeepestReadings<'a> {
-    fn of(presses: &'a [PressSummary]) -> Self {
+/// Whether an element responds to its own press.
+enum OwnPress {
+    Responds,
+    Untold,
+    Not(RespondsTo),
+}
+
+impl<'a> CentreReadings<'a> {
+    fn of(presses: &'a [PressSummary], cols: usize) -> Self {
+        let mut by_depth: BTreeMap<i64, BTreeMap<usize, &[f32]>> = BTreeMap::new();
         let mut deepest: BTreeMap<usize, (i64, &[f32])> = BTreeMap::new();
         for press in presses {
-            let dwell = press.dwells.iter().max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm));
-            if let (Some(element), Some(dwell)) = (press.element, dwell) {
-                deepest.entry(element).or_insert((depth_key(dwell.depth_mm), &dwell.rise_counts));
+            let Some(element) = press.element else { continue };
+            for dwell in &press.dwells {
+                let depth = depth_key(dwell.depth_mm);
+                by_depth.entry(depth).or_default().entry(element).or_insert(&dwell.rise_counts);
+                let known = deepest.entry(element).or_insert((depth, &dwell.rise_counts));
+                if depth > known.0 {
+                    *known = (depth, &dwell.rise_counts);
+                }
             }
         }
-        let mut own: Vec<f64> = deepest.iter().map(|(&element, (_, rises))| rise(rises, element)).collect();
-        own.sort_by(f64::total_cmp);
-        let median_own = own.get(own.len() / 2).copied().unwrap_or(0.0);
-        Self { deepest, median_own }
+        let own = deepest.iter().map(|(&element, (_, rises))| rise(rises, element)).collect();
+        let mut readings = Self { by_depth, cols, median_own: median(own), shares: BTreeMap::new() };
+        readings.shares = readings.median_shares();
+        readings
     }
 
-    /// The press to which an element responds.
-    fn of_element(&self, element: usize) -> RespondsAt {
-        // Some sensors' readings fall when pressed.
-        let toward = |rises: &[f32]| rise(rises, element) * self.median_own.signum();
-        let least = DEAD_SHARE * self.median_own.abs();
-        let Some((depth, rises)) = self.deepest.get(&element) else { return RespondsAt::Nowhere };
-        let own = toward(rises);
-        let most = self
-            .deepest
-            .iter()
-            .filter(|(_, (other_depth, _))| other_depth == depth)
-            .map(|(&pressed, (_, rises))| (pressed, toward(rises)))
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        match most {
-            Some((other, reading)) if reading >= least && own < OWN_SHARE * reading => RespondsAt::To(other),
-            _ if own < least => RespondsAt::Nowhere,
-            _ => RespondsAt::Own,
+    fn median_shares(&self) -> BTreeMap<(i64, [usize; 2]), f64> {
+        let mut shares: BTreeMap<(i64, [usize; 2]), Vec<f64>> = BTreeMap::new();
+        for (&depth, pressed) in &self.by_depth {
+            for (&element, rises) in pressed {
+                let own = self.toward(rises, element);
+                if own < self.least() {
+                    continue;
+                }
+                for (apart, reading) in self.near(element, pressed) {
+                    shares.entry((depth, apart)).or_default().push(reading / own);
+                }
+            }
         }
+        shares.retain(|_, shares| shares.len() >= SHARES_MIN);
+        shares.into_iter().map(|(key, shares)| (key, median(shares))).collect()
+    }
+
+    /// Readings of an element at the other presses near its own: how far away, and how much.
+    fn near<'b>(
+        &'b self,
+        element: usize,
+        pressed: &'b BTreeMap<usize, &[f32]>,
+    ) -> impl Iterator<Item = ([usize; 2], f64)> + 'b {
+        pressed.iter().filter(move |(other, _)| **other != element).filter_map(move |(&other, rises)| {
+            let rows = (element / self.cols).abs_diff(other / self.cols);
+            let cols = (element % self.cols).abs_diff(other % self.cols);
+            (rows <= NEAR && cols <= NEAR).then(|| ([rows, cols], self.toward(rises, element)))
+        })
+    }
+
+    /// The reading in the direction of a press: some sensors' readings fall when pressed.
+    fn toward(&self, rises: &[f32], element: usize) -> f64 {
+        rise(rises, element) * self.median_own.signum()
+    }
+
+    /// Least reading of a responsive element at its own press.
+    fn least(&self) -> f64 {
+        DEAD_SHARE * self.median_own.abs()
+    }
+
+    fn verdict(&self, element: usize) -> OwnPress {
+        // The deepest shows most.
+        let of_element = || self.by_depth.iter().rev().filter(|(_, pressed)| pressed.contains_key(&element));
+        let Some((_, deepest)) = of_element().next() else { return OwnPress::Untold };
+        let own_of = |pressed: &BTreeMap<usize, &[f32]>| {
+            pressed.get(&element).map_or(0.0, |rises| self.toward(rises, element))
+        };
+        let mut is_told = false;
+        for (&depth, pressed) in of_element() {
+            let own = own_of(pressed);
+            let at = |(&other, rises): (&usize, &&[f32])| (other, self.toward(rises, element));
+            let most = pressed.iter().map(at).max_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some((other, reading)) = most
+                && reading >= self.least()
+                && own < OWN_SHARE * reading
+            {
+                return OwnPress::Not(RespondsTo::Element([other / self.cols, other % self.cols]));
+            }
+            if own < self.least() {
+                continue;
+            }
+            for (apart, reading) in self.near(element, pressed) {
+                let Some(share) = self.shares.get(&(depth, apart)) else { continue };
+                is_told = true;
+                if reading / own > f64::midpoint(1.0, *share) {
+                    return OwnPress::Not(RespondsTo::Elsewhere);
+                }
+            }
+        }
+        if own_of(deepest) < self.least() {
+            return OwnPress::Not(RespondsTo::Nothing);
+        }
+        if is_told { OwnPress::Responds } else { OwnPress::Untold }
     }
 }
 
-/// The press to which an element responds.
-enum RespondsAt {
-    Own,
-    To(usize),
-    Nowhere,
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 fn rise(rises: &[f32], element: usize) -> f64 {

@@ -1,7 +1,7 @@
 use tactus_model::Array;
 use tactus_schema::Rig;
 
-use super::ResponseCurves;
+use super::{RespondsTo, ResponseCurves};
 use crate::run::{DwellSummary, PressSummary};
 
 const DEPTHS_MM: [f64; 5] = [0.2, 0.3, 0.4, 0.5, 0.6];
@@ -66,13 +66,44 @@ fn cross_wired_and_dead_elements_are_found_and_left_out() {
             response.unresponsive.iter().map(|s| (s.curve.element, s.curve.place, s.answers_to)).collect();
         assert_eq!(
             found,
-            [(18, [2, 2], Some([2, 3])), (22, [2, 6], Some([2, 7])), (40, [5, 0], None)],
+            [
+                (18, [2, 2], RespondsTo::Element([2, 3])),
+                (22, [2, 6], RespondsTo::Element([2, 7])),
+                (40, [5, 0], RespondsTo::Nothing)
+            ],
             "sign {sign}"
         );
         assert_eq!(response.curves.len(), 45);
         let slope = response.linear.unwrap().coefficients[1].value;
         assert!((slope - sign * 1000.0).abs() < 0.01, "{slope}");
     }
+}
+
+/// As the part `tilt` of `diagnose`: the elements that the faulty ones answer for are not pressed.
+#[test]
+fn cross_wired_elements_are_found_where_only_every_second_element_is_pressed() {
+    let share = |element, pressed| match element {
+        18 => spread(19, pressed),
+        22 => spread(23, pressed),
+        element => spread(element, pressed),
+    };
+    let mut every_second = presses(|x| 1000.0 * x, share);
+    every_second.retain(|press| press.element.is_some_and(|element| (element / 8 + element % 8) % 2 == 0));
+    let response = ResponseCurves::of(&rig(), &every_second).unwrap();
+    let found: Vec<_> = response.unresponsive.iter().map(|s| (s.curve.element, s.answers_to)).collect();
+    assert_eq!(found, [(18, RespondsTo::Elsewhere), (22, RespondsTo::Elsewhere)]);
+    assert_eq!((response.curves.len(), response.untold.len()), (22, 0));
+    let slope = response.linear.unwrap().coefficients[1].value;
+    assert!((slope - 1000.0).abs() < 0.01, "{slope}");
+}
+
+#[test]
+fn of_elements_far_apart_nothing_is_said() {
+    let share = |element, pressed| if element == 18 { spread(19, pressed) } else { spread(element, pressed) };
+    let mut two = presses(|x| 1000.0 * x, share);
+    two.retain(|press| [Some(18), Some(46)].contains(&press.element));
+    let response = ResponseCurves::of(&rig(), &two).unwrap();
+    assert_eq!((response.unresponsive.len(), response.untold), (0, vec![18, 46]));
 }
 
 #[test]

@@ -11,7 +11,7 @@
 use std::{env, fs, path::Path};
 
 use crate::synthetic::{Fed, Plan, Press, Run};
-use tactus_report::{RunReport, render_html, run_report};
+use tactus_report::{RespondsTo, RunReport, render_html, run_report};
 use tactus_schema::pb::{self, run_event::Event};
 
 fn report(run: &Run) -> RunReport {
@@ -56,7 +56,7 @@ fn an_element_centre_run_gives_its_curves_images_and_losses() {
     let response = report.response.as_ref().unwrap();
     let unresponsive: Vec<_> =
         response.unresponsive.iter().map(|s| (s.curve.element, s.answers_to)).collect();
-    assert_eq!(unresponsive, [(18, Some([2, 3])), (22, Some([2, 7]))]);
+    assert_eq!(unresponsive, [(18, RespondsTo::Element([2, 3])), (22, RespondsTo::Element([2, 7]))]);
     assert_eq!(response.curves.len(), 46);
     // The run's truth: 800 (x + 0.5 x^2), times gains of mean 1 and a spread of 8 %.
     let at_half = response.quadratic.as_ref().unwrap().at(0.5);
