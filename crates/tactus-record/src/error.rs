@@ -4,7 +4,7 @@ use std::{fmt, io, path::PathBuf};
 
 use tactus_schema::RigError;
 
-use crate::{MessageKind, table::TableError};
+use crate::{MessageKind, rig_groups::RigGroups, table::TableError};
 
 /// Why a recording could not be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -111,8 +111,8 @@ pub enum RowsError {
     #[error(transparent)]
     Table(#[from] TableError),
     /// Files that are read together must be of one array at one place, with the same tools.
-    #[error("{} was made with another rig than {}: take them apart", path.display(), first.display())]
-    RigsDiffer { first: PathBuf, path: PathBuf },
+    #[error("{} was made with another rig than {}: {difference}. {groups}", path.display(), first.display())]
+    RigsDiffer { first: PathBuf, path: PathBuf, difference: String, groups: RigGroups },
     /// No run may be in two files.
     #[error("{} holds run {run:?}, which was taken already", path.display())]
     RunTwice { path: PathBuf, run: String },

@@ -4,7 +4,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::{EpochClock, RowsError, Timeline, rows::RowSources, table::TableWriter};
+use crate::{
+    EpochClock, RowsError, Timeline,
+    rows::{RowSources, is_one_calibration},
+    table::{FormatWriter, TableFormat},
+};
 
 /// Key of the file metadata that holds the clock estimates, as JSON.
 const CLOCK_METADATA_KEY: &str = "tactus.clock";
@@ -46,14 +50,28 @@ pub struct RunClocks {
 /// time. Of damaged recordings the readable part is exported, with a warning. The table is checked while it is written,
 /// and appears at `out` only when it is complete.
 ///
+/// The table is Parquet: see [`export_as`].
+///
 /// # Errors
 /// If a recording cannot be read, has another rig or the same run as one before, or holds no stage position; if a
 /// frame breaks the table's contract; or if the table cannot be written.
 pub fn export<P: AsRef<Path>>(recordings: &[P], out: impl Into<PathBuf>) -> Result<ExportSummary, RowsError> {
+    export_as(recordings, out, TableFormat::Parquet)
+}
+
+/// As [`export`], in any format.
+///
+/// # Errors
+/// As [`export`].
+pub fn export_as<P: AsRef<Path>>(
+    recordings: &[P],
+    out: impl Into<PathBuf>,
+    format: TableFormat,
+) -> Result<ExportSummary, RowsError> {
     let out = out.into();
     let [first, rest @ ..] = recordings else { return Err(RowsError::Nothing) };
     let first = Timeline::read(first)?;
-    let mut table = TableWriter::create(&out, first.rig_json())?;
+    let mut table = FormatWriter::create(format, out.clone(), first.rig_json())?;
     let mut sources = RowSources::of(recordings)?;
     let mut clocks = Vec::new();
     let mut add = |timeline: &Timeline| {
@@ -67,7 +85,7 @@ pub fn export<P: AsRef<Path>>(recordings: &[P], out: impl Into<PathBuf>) -> Resu
         Ok(source) => source,
         Err(error) => {
             table.abandon();
-            return Err(error);
+            return Err(error.with_groups(recordings, is_one_calibration));
         }
     };
     table.metadata(

@@ -16,6 +16,7 @@ use tactus_schema::{
 use crate::{
     Completeness, Entry, Message, RowsError, Sampling, Timeline,
     reader::{first_bytes, io_error, is_mcap, read, read_run},
+    rig_groups::{RigGroups, differences},
     table::{Checker, TableReader},
 };
 
@@ -84,14 +85,7 @@ pub fn visit<P: AsRef<Path>>(
         Ok(())
     };
     for path in paths.iter().map(AsRef::as_ref) {
-        let start = first_bytes(path)?;
-        if is_mcap(&start) {
-            sources.recording(&Timeline::read(path)?, &mut take)?;
-        } else if start.starts_with(PARQUET_MAGIC) {
-            sources.table(TableReader::open(path)?, &mut take)?;
-        } else {
-            return Err(RowsError::Neither { path: path.to_owned() });
-        }
+        sources.file(path, &mut take).map_err(|error| error.with_groups(paths, is_one_sensor))?;
     }
     sources.into_source()
 }
@@ -157,6 +151,22 @@ impl RowSources {
         Ok(Self { taken_over, ..Self::default() })
     }
 
+    /// Calls `take` for the rows of a file, whichever kind it is.
+    fn file(
+        &mut self,
+        path: &Path,
+        take: &mut impl FnMut(&Rig, RowView<'_>) -> Result<(), RowsError>,
+    ) -> Result<(), RowsError> {
+        let start = first_bytes(path)?;
+        if is_mcap(&start) {
+            self.recording(&Timeline::read(path)?, take)
+        } else if start.starts_with(PARQUET_MAGIC) {
+            self.table(TableReader::open(path)?, take)
+        } else {
+            Err(RowsError::Neither { path: path.to_owned() })
+        }
+    }
+
     /// Calls `take` for the rows of a recording.
     pub(crate) fn recording(
         &mut self,
@@ -216,7 +226,7 @@ impl RowSources {
     fn one_sensor(&mut self, path: &Path, rig: &Rig) -> Result<(), RowsError> {
         let (first, first_rig) = self.first.get_or_insert_with(|| (path.to_owned(), rig.clone()));
         if !is_one_sensor(first_rig, rig) {
-            return Err(RowsError::RigsDiffer { first: first.clone(), path: path.to_owned() });
+            return Err(RowsError::rigs_differ((first, first_rig), (path, rig), FREE_OF_ONE_SENSOR));
         }
         if !self.names.contains(&rig.name) {
             self.names.push(rig.name.clone());
@@ -227,8 +237,8 @@ impl RowSources {
     /// Refuses files whose rigs differ in more than covering and tool.
     pub(crate) fn one_calibration(&self, path: &Path, rig: &Rig) -> Result<(), RowsError> {
         match &self.first {
-            Some((first, known)) if calibrated(known) != calibrated(rig) => {
-                Err(RowsError::RigsDiffer { first: first.clone(), path: path.to_owned() })
+            Some((first, known)) if !is_one_calibration(known, rig) => {
+                Err(RowsError::rigs_differ((first, known), (path, rig), FREE_OF_ONE_CALIBRATION))
             }
             _ => Ok(()),
         }
@@ -255,6 +265,48 @@ fn is_one_sensor(first: &Rig, rig: &Rig) -> bool {
         ..calibrated(rig)
     };
     as_first == calibrated(first)
+}
+
+/// Keys of a rig that may differ between the runs of one sensor: see [`is_one_sensor`].
+const FREE_OF_ONE_SENSOR: &[&str] =
+    &["name", "psf", "sensitivity_counts_per_mm", "baseline_counts", "covering", "indenter"];
+
+/// Keys of a rig that may differ between the runs of one calibration: see [`calibrated`].
+const FREE_OF_ONE_CALIBRATION: &[&str] = &["covering", "indenter"];
+
+/// True if two rigs agree in all but covering and tool.
+pub(crate) fn is_one_calibration(first: &Rig, rig: &Rig) -> bool {
+    calibrated(first) == calibrated(rig)
+}
+
+impl RowsError {
+    fn rigs_differ((first, first_rig): (&Path, &Rig), (path, rig): (&Path, &Rig), free: &[&str]) -> Self {
+        Self::RigsDiffer {
+            first: first.to_owned(),
+            path: path.to_owned(),
+            difference: differences(first_rig, rig, free),
+            groups: RigGroups::default(),
+        }
+    }
+
+    /// Says of rigs that differ which files go together.
+    pub(crate) fn with_groups<P: AsRef<Path>>(
+        self,
+        paths: &[P],
+        go_together: impl Fn(&Rig, &Rig) -> bool,
+    ) -> Self {
+        match self {
+            Self::RigsDiffer { first, path, difference, .. } => {
+                Self::RigsDiffer { first, path, difference, groups: RigGroups::of(paths, go_together) }
+            }
+            other @ (Self::Nothing
+            | Self::Neither { .. }
+            | Self::Record(_)
+            | Self::Table(_)
+            | Self::RunTwice { .. }
+            | Self::NoStage { .. }) => other,
+        }
+    }
 }
 
 /// A rig without covering and tool.

@@ -6,9 +6,13 @@
 
 mod check;
 mod column;
+mod csv;
 mod error;
+mod format;
 mod layout;
+mod npz;
 mod part_file;
+mod plain_part;
 mod read;
 mod residuals;
 mod write;
@@ -21,10 +25,12 @@ use tactus_schema::{
 };
 
 pub use error::TableError;
+pub use format::TableFormat;
 pub use residuals::ResidualWriter;
 pub use write::TableWriter;
 
 pub(crate) use check::Checker;
+pub(crate) use format::FormatWriter;
 pub(crate) use read::TableReader;
 
 /// A checked measurement table in memory, by columns.

@@ -9,8 +9,8 @@ use std::{
 
 use crate::synthetic::{Fed, Plan, Run, TICK_NS};
 use tactus_record::{
-    Recording, RowsError, export,
-    table::{self, Table},
+    Recording, RowsError, export, export_as,
+    table::{self, Table, TableFormat},
 };
 use tactus_schema::{Rig, pb, table::Phase};
 
@@ -265,6 +265,8 @@ fn runs_on_different_rigs_do_not_mix() {
     other.record(&second).unwrap();
     let error = export(&[&first, &second], dir.path().join("out.parquet")).unwrap_err();
     assert!(matches!(error, RowsError::RigsDiffer { .. }), "{error}");
+    let text = error.to_string();
+    assert!(text.contains(": baseline_counts is ") && text.contains("of 2 rigs"), "{text}");
 }
 
 #[test]
@@ -313,4 +315,49 @@ fn a_cut_recording_gives_what_is_there_with_a_warning() {
     let (summary, table) = exported(dir.path(), &[&path]);
     assert!(!table.is_empty() && table.len() < run.frames().count());
     assert!(summary.warnings[0].contains("readable up to byte"), "{:?}", summary.warnings);
+}
+
+#[test]
+fn a_table_is_text_or_arrays_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let (run, path) = recorded(dir.path(), Plan::short(2));
+    let (_, table) = exported(dir.path(), &[&path]);
+    let rows: Vec<_> = table.rows().collect();
+
+    let out = dir.path().join("table.csv");
+    assert_eq!(TableFormat::of_path(&out), Some(TableFormat::Csv));
+    let summary = export_as(&[&path], &out, TableFormat::Csv).unwrap();
+    assert_eq!(summary.rows, rows.len() as u64);
+    let text = fs::read_to_string(&out).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    assert_eq!((header.len(), header[0], header[10], header[57]), (58, "run", "counts_0", "counts_47"));
+    let lines: Vec<_> = lines.collect();
+    assert_eq!(lines.len(), rows.len());
+    for (line, row) in lines.iter().zip(&rows) {
+        let count = |element: usize| line[10 + element].parse::<f32>().unwrap();
+        assert_eq!((line[0], line[2], line[9]), (row.run, row.phase.name(), ""));
+        assert_eq!((line[3].parse(), line[6].parse()), (Ok(row.t_ns), Ok(row.position_mm[2])));
+        assert_eq!([count(0), count(47)], [row.counts[0], row.counts[47]]);
+    }
+    let beside = fs::read_to_string(dir.path().join("table.metadata.json")).unwrap();
+    let beside: serde_json::Value = serde_json::from_str(&beside).unwrap();
+    assert_eq!(
+        (&beside["tactus.rig"]["name"], &beside["tactus.clock"]["schema"]),
+        (&run.rig.name.clone().into(), &"tactus.clock/1".into())
+    );
+
+    let out = dir.path().join("table.npz");
+    export_as(&[&path], &out, TableFormat::Npz).unwrap();
+    let bytes = fs::read(&out).unwrap();
+    let counts: Vec<u8> =
+        rows.iter().flat_map(|row| row.counts.iter().flat_map(|count| count.to_le_bytes())).collect();
+    let holds = |part: &[u8]| bytes.windows(part.len()).any(|window| window == part);
+    assert!(bytes.starts_with(b"PK\x03\x04") && holds(b"counts.npy\x93NUMPY\x01\x00"));
+    assert!(holds(format!("'shape': ({}, 48), }}", rows.len()).as_bytes()) && holds(&counts));
+    // No `.part` is left.
+    let left = fs::read_dir(dir.path())
+        .unwrap()
+        .filter(|file| file.as_ref().unwrap().path().extension().is_some_and(|e| e == "part"));
+    assert_eq!(left.count(), 0);
 }

@@ -95,6 +95,14 @@ fn what_does_not_go_together_is_refused_before_its_first_row() {
     let other = exported(&recorded(dir.path(), &other));
     let (error, given) = refused(&[&recording, &other]);
     assert!(matches!(&error, RowsError::RigsDiffer { path, .. } if *path == other), "{error}");
+    let groups = format!(
+        "The files are of 2 rigs; give those of one rig at a time:\n  rig \"sim\": {}\n  rig \"sim\": {}",
+        recording.display(),
+        other.display()
+    );
+    let text = error.to_string();
+    assert!(text.contains("registration.origin_mm is [20.5,15.0], not [20.0,15.0]. "), "{text}");
+    assert!(text.ends_with(&groups), "{text}");
     assert_eq!(given, rows);
 }
 
