@@ -11,16 +11,26 @@ const BEHIND_PERIODS: f64 = 0.5;
 /// The longest delay by buffers on the way. Frames that are later than this were lost.
 const BUFFERED_S: f64 = 1.0;
 
+/// A lateness must last for this long, and for half a period, before it is a loss: a busy host delays the frames of fast sensors by
+/// many periods.
+const LASTS_S: f64 = 0.005;
+
+/// The longest tick, in frame periods, of a clock that can confirm a loss.
+const COARSE_PERIODS_MAX: f64 = 2.0;
+
 /// Share of a small lateness that is discarded with each frame, because real rates differ slightly from the rig's.
 const FORGOTTEN: f64 = 0.1;
 
 /// Numbers every frame that the sensor took or should have taken. Missing frames are counted by the device's own count;
-/// without one by its clock; and by the host's clock if the device has none, or a new one.
+/// without one by its clock; and by the host's clock if the device has none, a new one, or one whose ticks are about as long as
+/// the frames: that one has to confirm them.
 #[derive(Debug, Clone)]
 pub(super) struct Sequence {
     rate_hz: f64,
     /// Length of a device tick; `None` without a clock, or if a tick is too long to resolve frames.
     tick: Option<Duration>,
+    /// Length of a tick that is too long to count missing frames, but short enough to confirm them.
+    coarse_tick: Option<Duration>,
     /// Number of the present epoch; the first is 0.
     epoch: u32,
     last: Option<PreviousFrame>,
@@ -31,8 +41,17 @@ struct PreviousFrame {
     seq: u64,
     tick: Option<DeviceTick>,
     received: MonoTime,
-    /// How late it was by the host's clock, in frame periods.
-    late_periods: f64,
+    lateness: Lateness,
+}
+
+/// How late a frame was, in frame periods, after the missing ones were counted.
+#[derive(Debug, Clone, Copy, Default)]
+struct Lateness {
+    by_host: f64,
+    /// By a coarse clock of the device.
+    by_clock: f64,
+    /// Since when each frame was late by half a period or more, and the least of their latenesses.
+    lasts: Option<(MonoTime, f64)>,
 }
 
 /// A frame as it arrived, before it has a number.
@@ -76,21 +95,24 @@ pub(super) enum GapCause {
 impl Sequence {
     /// No frames yet, and no device's clock.
     pub(super) fn new(rate_hz: f64) -> Self {
-        Self { rate_hz, tick: None, epoch: 0, last: None }
+        Self { rate_hz, tick: None, coarse_tick: None, epoch: 0, last: None }
     }
 
     /// Sets the length of the device's tick; zero for a device without a clock.
     pub(super) fn set_tick(&mut self, tick: Duration) {
         // Between frames closer than two ticks, a clock cannot count the missing ones.
-        let resolves_frames = !tick.is_zero() && 2.0 * tick.as_secs_f64() * self.rate_hz <= 1.0;
+        let periods = tick.as_secs_f64() * self.rate_hz;
+        let resolves_frames = !tick.is_zero() && 2.0 * periods <= 1.0;
         self.tick = resolves_frames.then_some(tick);
+        self.coarse_tick =
+            (!resolves_frames && periods > 0.0 && periods <= COARSE_PERIODS_MAX).then_some(tick);
     }
 
     /// Numbers the next frame.
     pub(super) fn place(&mut self, arrival: ReceivedFrame) -> FramePlacement {
         let ReceivedFrame { tick, received, cause, .. } = arrival;
         let Some(last) = self.last else {
-            self.last = Some(PreviousFrame { seq: 0, tick, received, late_periods: 0.0 });
+            self.last = Some(PreviousFrame { seq: 0, tick, received, lateness: Lateness::default() });
             return FramePlacement {
                 seq: 0,
                 epoch: self.epoch,
@@ -101,9 +123,9 @@ impl Sequence {
         };
         let new_epoch = matches!(cause, GapCause::Reconnected | GapCause::ClockJumped);
         self.epoch += u32::from(new_epoch);
-        let (lost_before, late_periods) = self.missing(last, &arrival);
+        let (lost_before, lateness) = self.missing(last, &arrival);
         let seq = last.seq + u64::from(lost_before) + 1;
-        self.last = Some(PreviousFrame { seq, tick, received, late_periods });
+        self.last = Some(PreviousFrame { seq, tick, received, lateness });
         let gap = (lost_before > 0).then(|| pb::Gap {
             frames_lost: lost_before.into(),
             after_seq: last.seq,
@@ -122,16 +144,16 @@ impl Sequence {
 }
 
 impl Sequence {
-    /// How many frames are missing, and how many periods late the frame is after those are counted.
-    fn missing(&self, last: PreviousFrame, arrival: &ReceivedFrame) -> (u32, f64) {
+    /// How many frames are missing, and how late the frame is after those are counted.
+    fn missing(&self, last: PreviousFrame, arrival: &ReceivedFrame) -> (u32, Lateness) {
         let periods = arrival.received.since(last.received).as_secs_f64() * self.rate_hz;
         let by_host = (periods - arrival.together as f64).round();
-        let by_ticks = || {
-            let (tick, [from, to]) = (self.tick?, [last.tick?, arrival.tick?]);
-            Some((to.0.saturating_sub(from.0) as f64 * tick.as_secs_f64() * self.rate_hz).round() - 1.0)
+        let periods_by = |tick: Option<Duration>| {
+            let (tick, [from, to]) = (tick?, [last.tick?, arrival.tick?]);
+            Some(to.0.saturating_sub(from.0) as f64 * tick.as_secs_f64() * self.rate_hz)
         };
         let dropped = arrival.dropped as f64;
-        let mut late_periods = 0.0;
+        let mut lateness = Lateness::default();
         let missing = match (arrival.cause, arrival.evidence) {
             (
                 GapCause::Link | GapCause::HostTooSlow | GapCause::ClockJumped,
@@ -142,13 +164,22 @@ impl Sequence {
                 lost + ((by_host - lost) / wrap as f64).round().max(0.0) * wrap as f64
             }
             (GapCause::Reconnected | GapCause::ClockJumped, _) => by_host,
-            (GapCause::Link | GapCause::HostTooSlow, evidence) => by_ticks().unwrap_or_else(|| {
-                let late = last.late_periods + periods - 1.0 - dropped;
-                let lost =
-                    self.missing_by_arrivals(last.late_periods, late, periods, evidence, arrival.together);
-                late_periods = settled(late - lost);
-                lost + dropped
-            }),
+            (GapCause::Link | GapCause::HostTooSlow, _) => match periods_by(self.tick) {
+                Some(periods) => periods.round() - 1.0,
+                None => {
+                    let by_host = last.lateness.by_host + periods - 1.0 - dropped;
+                    let by_clock = periods_by(self.coarse_tick)
+                        .map(|periods| last.lateness.by_clock + periods - 1.0 - dropped);
+                    let late = by_clock.map_or(by_host, |by_clock| by_host.min(by_clock));
+                    let (lost, lasts) = self.missing_by_arrivals(last.lateness.lasts, late, arrival);
+                    lateness = Lateness {
+                        by_host: settled(by_host - lost),
+                        by_clock: settled(by_clock.unwrap_or_default() - lost),
+                        lasts,
+                    };
+                    lost + dropped
+                }
+            },
         };
         #[expect(
             clippy::cast_possible_truncation,
@@ -156,27 +187,34 @@ impl Sequence {
             reason = "saturates, as it should"
         )]
         let missing = missing.max(dropped) as u32;
-        (missing, late_periods)
+        (missing, lateness)
     }
 
-    /// Missing frames by times of arrival alone. A single late frame may follow lost frames, or may itself be delayed.
-    /// Delayed frames arrive close together, and the last of them is in time again. A loss is therefore counted when the
-    /// next frame, a period later, is as late; and at once if bytes were damaged or the silence exceeds any buffer.
+    /// Missing frames by times of arrival, which a coarse clock of the device may confirm. A late frame may follow lost frames, or may
+    /// itself be delayed. Delayed frames arrive close together, and the last of them is in time again. A loss is therefore counted
+    /// when the lateness lasts; and at once if bytes were damaged or the silence exceeds any buffer.
+    ///
+    /// Also returns since when the frames are late, and the least of their latenesses.
     fn missing_by_arrivals(
         &self,
-        was_late: f64,
+        lasts: Option<(MonoTime, f64)>,
         late: f64,
-        periods: f64,
-        evidence: LossEvidence,
-        together: usize,
-    ) -> f64 {
-        let alone = late - (together.max(1) - 1) as f64;
-        if evidence == LossEvidence::Damage || alone >= BUFFERED_S * self.rate_hz {
-            alone.round().max(0.0)
-        } else if periods >= BEHIND_PERIODS && was_late >= BEHIND_PERIODS && late >= BEHIND_PERIODS {
-            was_late.min(late).round()
+        arrival: &ReceivedFrame,
+    ) -> (f64, Option<(MonoTime, f64)>) {
+        let alone = late - (arrival.together.max(1) - 1) as f64;
+        if arrival.evidence == LossEvidence::Damage || alone >= BUFFERED_S * self.rate_hz {
+            return (alone.round().max(0.0), None);
+        }
+        if late < BEHIND_PERIODS {
+            return (0.0, None);
+        }
+        let (since, least) =
+            lasts.map_or((arrival.received, late), |(since, least)| (since, least.min(late)));
+        let lasted_s = arrival.received.since(since).as_secs_f64();
+        if lasted_s >= (BEHIND_PERIODS / self.rate_hz).max(LASTS_S) {
+            (least.round(), None)
         } else {
-            0.0
+            (0.0, Some((since, least)))
         }
     }
 }

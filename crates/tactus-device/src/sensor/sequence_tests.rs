@@ -154,3 +154,45 @@ fn a_clock_too_coarse_to_tell_frames_apart_counts_none() {
     assert_eq!(missing(Duration::from_secs(1), second), 0);
     assert_eq!(missing(Duration::from_millis(10), ReceivedFrame { tick: Some(DeviceTick(10)), ..second }), 2);
 }
+
+/// Of a 1 kHz sensor, what is missing before each frame that has this tick and comes at this time.
+fn missing_at_1_khz(tick: Duration, frames: impl Iterator<Item = (u64, i64)>) -> Vec<u32> {
+    let mut sequence = Sequence::new(1000.0);
+    sequence.set_tick(tick);
+    let place = |(tick, received_us)| {
+        let received = MonoTime::from_ns(received_us * 1000);
+        sequence.place(ReceivedFrame { tick: Some(DeviceTick(tick)), received, ..arrival(0) }).lost_before
+    };
+    frames.map(place).collect()
+}
+
+/// A host that wakes late, by up to some milliseconds, and then takes what has come meanwhile.
+fn taken_late(frame: i64) -> i64 {
+    let wakes_us = 1000 + (frame / 7 * 7919) % 6000;
+    (frame * 1000 / wakes_us + 1) * wakes_us
+}
+
+#[test]
+fn a_fast_sensor_on_a_busy_host_loses_nothing_that_came() {
+    let tick = Duration::from_millis(1);
+    let jitter_us = |frame: i64| 300 * ((frame / 3) % 7);
+    for taken_us in [&(|frame| 1000 * frame + jitter_us(frame)) as &dyn Fn(i64) -> i64, &taken_late] {
+        let missing =
+            missing_at_1_khz(tick, (0..5000u32).map(|frame| (frame.into(), taken_us(frame.into()))));
+        assert_eq!(missing.iter().sum::<u32>(), 0);
+    }
+}
+
+#[test]
+fn what_a_fast_sensor_loses_is_counted_once_it_lasts() {
+    for (lost, tick) in [(1, 1), (1, 0), (3, 1), (40, 0), (40, 1)] {
+        let frames = (0..2000u64).filter(|frame| !(1000..1000 + lost).contains(frame));
+        let missing = missing_at_1_khz(
+            Duration::from_millis(tick),
+            frames.map(|frame| (frame, i64::try_from(frame).unwrap() * 1000)),
+        );
+        assert_eq!(u64::from(missing.iter().sum::<u32>()), lost, "{lost} with ticks of {tick} ms");
+        let at = missing.iter().position(|missing| *missing > 0).unwrap();
+        assert!((1000..1020).contains(&at), "{at}");
+    }
+}
