@@ -1,11 +1,11 @@
 //! The command line, and what `rig` and `usb` share.
 
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
 use std::thread;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
 use serde_json::json;
 use tactus_device::SensorCodec;
@@ -151,6 +151,8 @@ fn in_runtime(serving: impl Future<Output = Result<()>>) -> Result<()> {
 
 async fn serve(args: RigArgs) -> Result<()> {
     let source = args.source.read()?;
+    // Held to the end: another virtual rig would take the links over.
+    let _folder = args.link_dir.as_deref().map(occupy).transpose()?;
     let termination = Termination::listen()?;
     let sensor_port = open(args.link_dir.as_deref(), "sensor")?;
     let stage_port = open(args.link_dir.as_deref(), "stage")?;
@@ -217,6 +219,20 @@ pub(crate) async fn until_terminated<E: std::error::Error + Send + Sync + 'stati
 
 fn truth(path: &Path, rig: &Rig, seed: u64) -> Result<Truth> {
     Ok(TruthFile::from_toml(&fs::read_to_string(path)?)?.behind(rig, seed)?)
+}
+
+/// Locks a folder of links for this process, as long as the returned file is open.
+fn occupy(folder: &Path) -> Result<File> {
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let lock = File::open(folder).with_context(|| folder.display().to_string())?;
+    match lock.try_lock() {
+        Ok(()) => Ok(lock),
+        Err(TryLockError::WouldBlock) => bail!(
+            "another virtual rig has its links in {}: stop it, or give another folder with --link-dir",
+            folder.display()
+        ),
+        Err(TryLockError::Error(error)) => Err(error).with_context(|| folder.display().to_string()),
+    }
 }
 
 fn open(link_dir: Option<&Path>, device: &str) -> Result<TerminalPort> {
