@@ -22,6 +22,7 @@ use zenoh::{
 
 use crate::{
     Alive, BusError, Credentials, Endpoint, HeldLease, History, Hold, Published, Subscription, config,
+    error::of_zenoh,
     liveness::{Roster, Trust},
     topic::encoding,
 };
@@ -53,7 +54,7 @@ impl Client {
     ///
     /// # Errors
     /// [`BusError::NoService`], [`BusError::NotAllowed`], [`BusError::Session`]; [`BusError::RigName`] for an invalid name;
-    /// without a name also [`BusError::NoRig`] and [`BusError::SeveralRigs`]; behind a router
+    /// [`BusError::UnknownRig`] if only other rigs are served; without a name also [`BusError::NoRig`] and [`BusError::SeveralRigs`]; behind a router
     /// [`BusError::SeveralServices`].
     ///
     /// # Panics
@@ -77,19 +78,12 @@ impl Client {
         if let Some(rig) = rig {
             check_rig_name(rig)?;
         }
-        reach(endpoint).await.map_err(|source| {
-            let endpoint = endpoint.to_string();
-            if source.kind() == io::ErrorKind::PermissionDenied {
-                BusError::NotAllowed { endpoint, source }
-            } else {
-                BusError::NoService { endpoint, source }
-            }
-        })?;
+        reach(endpoint).await?;
         let session = open(endpoint, credentials).await?;
         let roster = Roster::keep(&session).await?;
         let neighbours: Vec<ZenohId> = session.info().peers_zid().await.collect();
         let rig = match rig {
-            Some(rig) => rig.to_owned(),
+            Some(rig) => the_named_rig(rig, &roster, endpoint)?,
             None => the_rig_of(&neighbours, &roster, endpoint)?,
         };
         if roster.is_ambiguous(&rig, &neighbours) {
@@ -184,7 +178,7 @@ impl Client {
     /// # Errors
     /// [`BusError::Close`] if zenoh could not close the session cleanly.
     pub async fn close(self) -> Result<(), BusError> {
-        self.caller.session.close().await.map_err(|source| BusError::Close { source })
+        self.caller.session.close().await.map_err(|source| BusError::Close { source: of_zenoh(&source) })
     }
 }
 
@@ -208,6 +202,21 @@ impl Caller {
         }
         Err(BusError::NoAnswer { key, waited: patience })
     }
+}
+
+/// Names of all rigs whose services run at an endpoint, ready or not, sorted.
+///
+/// # Errors
+/// [`BusError::NoService`], [`BusError::NotAllowed`], [`BusError::Session`].
+///
+/// # Panics
+/// As [`Client::connect`].
+pub async fn rigs_at(endpoint: &Endpoint, credentials: &Credentials) -> Result<Vec<String>, BusError> {
+    reach(endpoint).await?;
+    let session = open(endpoint, credentials).await?;
+    let rigs = Roster::keep(&session).await?.served();
+    session.close().await.map_err(|source| BusError::Close { source: of_zenoh(&source) })?;
+    Ok(rigs)
 }
 
 /// Stops the rig of that name, or every rig that the bus at an endpoint reaches: by datagram and on the bus at once, without
@@ -345,7 +354,7 @@ async fn open(endpoint: &Endpoint, credentials: &Credentials) -> Result<Session,
     let opened = tokio::task::spawn_blocking(move || opening.wait()).await;
     opened
         .unwrap_or_else(|panic| Err(panic.into()))
-        .map_err(|source| BusError::Session { endpoint: endpoint.to_string(), source })
+        .map_err(|source| BusError::Session { endpoint: endpoint.to_string(), source: of_zenoh(&source) })
 }
 
 /// Refuses names with wildcards, which would command every rig on the bus.
@@ -358,17 +367,31 @@ fn check_rig_name(rig: &str) -> Result<(), BusError> {
 }
 
 /// Checks with a plain connection whether anything listens; zenoh would need seconds.
-async fn reach(endpoint: &Endpoint) -> io::Result<()> {
+async fn reach(endpoint: &Endpoint) -> Result<(), BusError> {
     let connected = async {
         match endpoint.unix_path() {
             Some(path) => UnixStream::connect(path).await.map(drop),
             None => TcpStream::connect(endpoint.address()).await.map(drop),
         }
     };
-    match timeout(REACH_TIMEOUT, connected).await {
-        Ok(connected) => connected,
-        Err(_) => Err(io::Error::new(io::ErrorKind::TimedOut, "the machine does not answer")),
+    let late = || Err(io::Error::new(io::ErrorKind::TimedOut, "the machine does not answer"));
+    timeout(REACH_TIMEOUT, connected).await.unwrap_or_else(|_| late()).map_err(|source| {
+        let endpoint = endpoint.to_string();
+        if source.kind() == io::ErrorKind::PermissionDenied {
+            BusError::NotAllowed { endpoint, source }
+        } else {
+            BusError::NoService { endpoint, source }
+        }
+    })
+}
+
+/// The rig of that name. If only others are served it is an error at once: nobody would answer.
+fn the_named_rig(rig: &str, roster: &Roster, endpoint: &Endpoint) -> Result<String, BusError> {
+    let rigs = roster.served();
+    if rigs.is_empty() || rigs.iter().any(|one| one == rig) {
+        return Ok(rig.to_owned());
     }
+    Err(BusError::UnknownRig { endpoint: endpoint.to_string(), rig: rig.to_owned(), rigs })
 }
 
 /// The rig of the service at the other end of the connection or, if that is a router, the only one that is ready.

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tactus_schema::key::Keys;
 use zenoh::Config;
 
-use crate::{BusError, Endpoint, access};
+use crate::{BusError, Endpoint, access, error::of_zenoh};
 
 /// Longest message that a service takes, in bytes. Zenoh collects a message of many parts in memory up to this size.
 const SERVICE_MESSAGE_BYTES_MAX: usize = 2 << 20;
@@ -136,7 +136,8 @@ impl BusConfig {
                 ("transport/link/tls/close_link_on_expiration", json!(true)),
             ]);
         }
-        zenoh_config(&settings).map_err(|source| BusError::Open { listen: listen.join(", "), source })
+        zenoh_config(&settings)
+            .map_err(|source| BusError::Open { listen: listen.join(", "), source: of_zenoh(&source) })
     }
 }
 
@@ -162,7 +163,8 @@ pub(crate) fn client(endpoint: &Endpoint, credentials: &Credentials) -> Result<C
     if credentials.certificate.is_some() {
         settings.push(("transport/link/tls/enable_mtls", json!(true)));
     }
-    zenoh_config(&settings).map_err(|source| BusError::Session { endpoint: endpoint.to_string(), source })
+    zenoh_config(&settings)
+        .map_err(|source| BusError::Session { endpoint: endpoint.to_string(), source: of_zenoh(&source) })
 }
 
 fn texts(endpoints: &[Endpoint]) -> Vec<String> {

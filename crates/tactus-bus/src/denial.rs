@@ -13,7 +13,9 @@ use tactus_schema::{
 };
 use zenoh::{Config, Session, query::ConsolidationMode};
 
-use crate::{BusConfig, BusError, Credentials, Endpoint, TlsConfig, config, topic::encoding};
+use crate::{
+    BusConfig, BusError, Credentials, Endpoint, TlsConfig, config, error::of_zenoh, topic::encoding,
+};
 
 /// Time for a denied command to get through after all.
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -35,7 +37,7 @@ pub(crate) async fn check(config: &BusConfig, keys: &Keys) -> Result<(), BusErro
             denied(&session, keys, endpoint, "without a certificate").await?;
         }
         if let Some(reader) = reader(tls) {
-            let source = |source| BusError::Session { endpoint: near.to_string(), source };
+            let source = |source| BusError::Session { endpoint: near.to_string(), source: of_zenoh(&source) };
             let session = zenoh::open(unverified(&near, &reader)?).await.map_err(source)?;
             denied(&session, keys, endpoint, "with the certificate of a reader").await?;
         }
@@ -60,7 +62,7 @@ async fn denied(session: &Session, keys: &Keys, endpoint: &Endpoint, who: &str) 
             return Err(BusError::NotDenied { endpoint: endpoint.to_string(), who: who.to_owned() });
         }
     }
-    session.close().await.map_err(|source| BusError::Close { source })
+    session.close().await.map_err(|source| BusError::Close { source: of_zenoh(&source) })
 }
 
 /// The endpoint as this machine reaches it.
@@ -74,7 +76,7 @@ fn unverified(endpoint: &Endpoint, credentials: &Credentials) -> Result<Config, 
     let mut config = config::client(endpoint, credentials)?;
     config
         .insert_json5("transport/link/tls/verify_name_on_connect", "false")
-        .map_err(|source| BusError::Session { endpoint: endpoint.to_string(), source })?;
+        .map_err(|source| BusError::Session { endpoint: endpoint.to_string(), source: of_zenoh(&source) })?;
     Ok(config)
 }
 

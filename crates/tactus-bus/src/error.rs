@@ -48,6 +48,9 @@ pub enum BusError {
     /// Several rigs are ready and none was named.
     #[error("several rigs are ready at {endpoint}: {}; name one", .rigs.join(", "))]
     SeveralRigs { endpoint: String, rigs: Vec<String> },
+    /// The rig that was named is not served.
+    #[error("no rig {rig:?} at {endpoint}; there is: {}", .rigs.join(", "))]
+    UnknownRig { endpoint: String, rig: String, rigs: Vec<String> },
     /// No service answered a stop, neither to a datagram nor on the bus.
     #[error("STOP WAS NOT CONFIRMED: no service at {endpoint} answered. Use the emergency stop")]
     NotStopped { endpoint: String, source: Box<dyn Error + Send + Sync> },
@@ -73,6 +76,34 @@ pub enum BusError {
 impl BusError {
     /// The error for a refused key.
     pub(crate) fn key(key: &str) -> impl FnOnce(zenoh::Error) -> Self {
-        move |source| Self::Key { key: key.to_owned(), source }
+        move |source| Self::Key { key: key.to_owned(), source: of_zenoh(&source) }
     }
 }
+
+/// Zenoh's error without the places in its source, which name folders of the machine that built it.
+pub(crate) fn of_zenoh(error: &zenoh::Error) -> Box<dyn Error + Send + Sync> {
+    without_places(&error.to_string()).into()
+}
+
+/// Removes ` at FILE.rs:LINE.`, with which zenoh ends each cause.
+fn without_places(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for word in text.split(' ') {
+        let place = word.trim_end_matches([')', ']', ',', ';']);
+        let line = place.trim_end_matches('.').rsplit_once(".rs:").map(|(_, line)| line);
+        if let Some(before) = plain.strip_suffix(" at")
+            && line.is_some_and(|line| line.parse::<u32>().is_ok())
+        {
+            plain.truncate(before.len());
+            plain.push_str(&word[place.len()..]);
+        } else {
+            plain.push_str(if plain.is_empty() { "" } else { " " });
+            plain.push_str(word);
+        }
+    }
+    plain
+}
+
+#[cfg(test)]
+#[path = "error_tests.rs"]
+mod tests;

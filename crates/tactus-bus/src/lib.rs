@@ -46,7 +46,7 @@ mod subscription;
 mod topic;
 mod worker;
 
-pub use client::{Client, stop};
+pub use client::{Client, rigs_at, stop};
 pub use command::{Calls, CommandCall, Request, Responder};
 pub use config::{BusConfig, Credentials, TlsConfig};
 pub use endpoint::Endpoint;

@@ -236,6 +236,12 @@ impl Roster {
         self.known.borrow().ready.iter().cloned().collect()
     }
 
+    /// Names of the rigs whose services run now, ready or not, sorted.
+    pub(crate) fn served(&self) -> Vec<String> {
+        let rigs: BTreeSet<String> = self.known.borrow().running.iter().map(|(rig, _)| rig.clone()).collect();
+        rigs.into_iter().collect()
+    }
+
     /// Names of the ready rigs whose service is one of these sessions, sorted.
     pub(crate) fn rigs_of(&self, sessions: &[ZenohId]) -> Vec<String> {
         let known = self.known.borrow();

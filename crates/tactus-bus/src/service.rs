@@ -16,6 +16,7 @@ use crate::{
     cache::{self, HistoryQuery},
     command::{self, Intake, PendingReply, Replies},
     denial,
+    error::of_zenoh,
     liveness::InstanceToken,
     publisher::{Lanes, Outgoing, TopicPublishers},
     queue::Queue,
@@ -75,7 +76,7 @@ impl Bus {
     async fn listen(config: &BusConfig, keys: Keys) -> Result<(Self, Calls), BusError> {
         let session = zenoh::open(config.service(&keys)?)
             .await
-            .map_err(|source| BusError::Open { listen: texts(config), source })?;
+            .map_err(|source| BusError::Open { listen: texts(config), source: of_zenoh(&source) })?;
         for path in config.listen.iter().filter_map(Endpoint::unix_path) {
             share(path).map_err(|source| BusError::Open { listen: texts(config), source: source.into() })?;
         }
@@ -134,7 +135,7 @@ impl Bus {
         }
         self.command_replies.finish().await;
         self.history_replies.finish().await;
-        self.session.close().await.map_err(|source| BusError::Close { source })
+        self.session.close().await.map_err(|source| BusError::Close { source: of_zenoh(&source) })
     }
 }
 
