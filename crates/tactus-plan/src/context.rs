@@ -210,7 +210,8 @@ impl EvaluationContext {
         self.steps.set(self.steps.get() + 1);
         let line =
             eval.call_stack_top_location().map_or_else(|| self.job.watch.line(), |span| sandbox::line(&span));
-        let call = Call { step, at: Location { script: self.job.script.name().to_owned(), line } };
+        let at = Location { script: self.job.script.name().to_owned(), line, column: None };
+        let call = Call { step, at };
         let gone = |()| Halt::from(Refusal::Stopped("nobody waits for the script any more".into()));
         self.job.calls.send(Message::Call(call)).map_err(|_| gone(()))?;
         Ok(self.job.replies.recv().map_err(|_| gone(()))??)

@@ -123,7 +123,8 @@ impl<'e> BeforeStmtFuncDyn<'e> for BeforeStatement {
 fn script_error(error: &Error, eval: &Evaluator<'_, '_, '_>, context: &EvaluationContext) -> ScriptError {
     let script = context.job.script.name().to_owned();
     let line = error.span().map_or_else(|| context.job.watch.line().max(1), sandbox::line);
-    let at = Location { script: script.clone(), line };
+    let column = error.span().map(sandbox::column);
+    let at = Location { script: script.clone(), line, column };
     let call_stack = shortened(error.to_string());
     match halt(error, eval, context) {
         Halt::Failed(problem) => ScriptError::Evaluation { at, problem: shortened(problem), call_stack },

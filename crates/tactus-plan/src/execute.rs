@@ -96,7 +96,8 @@ pub(crate) fn converse(
             Next::Message(Message::Ended(ended)) => return *ended,
             Next::LeftBehind(stop) => {
                 let line = watch.line().max(1);
-                return Err(left_behind(stop, Location { script: script.name().to_owned(), line }, limits));
+                let at = Location { script: script.name().to_owned(), line, column: None };
+                return Err(left_behind(stop, at, limits));
             }
             Next::Gone => {
                 let panic = thread.join().err();

@@ -27,18 +27,21 @@ pub struct Call {
     pub at: Location,
 }
 
-/// A line of a script, displayed as `corners.star:12`.
+/// A place in a script, displayed as `corners.star:12`, or `corners.star:12:5` with its column.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Location {
     /// The script's name, without the suffix.
     pub script: String,
     /// Line, from 1.
     pub line: u32,
+    /// Column in characters, from 1, where it is known.
+    pub column: Option<u32>,
 }
 
 impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.star:{}", self.script, self.line)
+        write!(f, "{}.star:{}", self.script, self.line)?;
+        self.column.map_or(Ok(()), |column| write!(f, ":{column}"))
     }
 }
 

@@ -25,8 +25,8 @@ pub(crate) const SOURCE_MAX_BYTES: usize = 256 << 10;
 
 /// Parses and checks a script, and replaces its operators by functions that measure first.
 pub(crate) fn parse(name: &str, source: &str) -> Result<AstModule, ScriptError> {
-    let syntax =
-        |line, problem| ScriptError::Syntax { at: Location { script: name.to_owned(), line }, problem };
+    let at = |line, column| Location { script: name.to_owned(), line, column };
+    let syntax = |line, problem| ScriptError::Syntax { at: at(line, None), problem };
     if source.len() > SOURCE_MAX_BYTES {
         let problem = format!("a script of {} bytes, the limit is {SOURCE_MAX_BYTES}", source.len());
         return Err(syntax(1, problem));
@@ -35,7 +35,9 @@ pub(crate) fn parse(name: &str, source: &str) -> Result<AstModule, ScriptError> 
     let mut ast =
         AstModule::parse(&format!("{name}.star"), source.to_owned(), &dialect()).map_err(|error| {
             let problem = error.without_diagnostic().to_string();
-            syntax(error.span().map_or(1, line), problem.trim_start_matches("Parse error: ").to_owned())
+            let (line, column) = error.span().map_or((1, None), |span| (line(span), Some(column(span))));
+            let problem = problem.trim_start_matches("Parse error: ").to_owned();
+            ScriptError::Syntax { at: at(line, column), problem }
         })?;
     language::check(&ast).map_err(|(line, problem)| syntax(line, problem))?;
     ast.replace_binary_operators(&operators::replacements());
@@ -45,6 +47,11 @@ pub(crate) fn parse(name: &str, source: &str) -> Result<AstModule, ScriptError> 
 /// First line of a span, from 1.
 pub(crate) fn line(span: &FileSpan) -> u32 {
     u32::try_from(span.resolve_span().begin.line).unwrap_or(u32::MAX).saturating_add(1)
+}
+
+/// First column of a span, from 1.
+pub(crate) fn column(span: &FileSpan) -> u32 {
+    u32::try_from(span.resolve_span().begin.column).unwrap_or(u32::MAX).saturating_add(1)
 }
 
 fn dialect() -> Dialect {

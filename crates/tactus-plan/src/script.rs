@@ -45,7 +45,7 @@ impl Script {
         }
         let ast = sandbox::parse(&name, source)?;
         let Some(run_line) = definition_line(&ast, "run") else {
-            let at = Location { script: name, line: 1 };
+            let at = Location { script: name, line: 1, column: None };
             return Err(ScriptError::Syntax { at, problem: "there is no `def run(rig):`".into() });
         };
         Ok(Self {

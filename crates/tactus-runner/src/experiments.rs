@@ -19,7 +19,9 @@ pub const BUILT_IN: &[(&str, &str)] = &[
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ExperimentError {
     /// No script of that name.
-    #[error("no experiment {name:?}; there is: {known}; or give the path of a .star file")]
+    #[error(
+        "no experiment {name:?}; there is: {known}; or give the path of a .star file. `tactus experiments` explains them"
+    )]
     Unknown { name: String, known: String },
     /// The file could not be read.
     #[error("{}: {source}", path.display())]

@@ -273,7 +273,7 @@ impl ScriptProcess {
     fn explain(&mut self, end: End) -> ScriptError {
         // It may have ended already; then this does nothing.
         let killed = self.child.kill().and_then(|()| self.child.wait());
-        let at = Location { script: self.script.clone(), line: self.line };
+        let at = Location { script: self.script.clone(), line: self.line, column: None };
         let limit = |exceeded| ScriptError::Limit { at: at.clone(), exceeded, call_stack: String::new() };
         let broken = |problem| ScriptError::Evaluator { script: self.script.clone(), problem };
         match (end, killed) {

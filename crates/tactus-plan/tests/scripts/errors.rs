@@ -25,7 +25,7 @@ fn a_refused_step_is_told_with_its_line() {
     let error =
         run("def run(rig):\n    tare()\n    for depth in [0.2, 0.9]:\n        press(3.0, 3.0, [depth])\n")
             .unwrap_err();
-    assert_eq!(error.to_string(), "bad.star:4: press is 0.9 mm deep, the limit is 0.7112 mm");
+    assert_eq!(error.to_string(), "bad.star:4:9: press is 0.9 mm deep, the limit is 0.7112 mm");
     assert!(matches!(error, ScriptError::Refused { refusal: Refusal::Outside(_), .. }), "{error:?}");
 }
 
@@ -34,7 +34,7 @@ fn the_line_is_the_innermost_of_the_script_and_the_way_there_is_kept() {
     let source =
         "def inner(depth):\n    press(3.0, 3.0, [depth])\n\ndef run(rig):\n    inner(0.2)\n    inner(0.9)\n";
     let error = run(source).unwrap_err();
-    assert_eq!(error.at().map(ToString::to_string).as_deref(), Some("bad.star:2"));
+    assert_eq!(error.at().map(ToString::to_string).as_deref(), Some("bad.star:2:5"));
     assert!(error.call_stack().contains("inner(0.9)"), "{}", error.call_stack());
 }
 
@@ -67,7 +67,7 @@ fn arguments_that_make_no_sense_anywhere_are_refused_before_the_host_sees_them()
         ("param('x', default = 1)", "parameters are declared at the top level, not inside run"),
         ("fail('found', 3, [1.5])", "found 3 [1.5]"),
     ] {
-        assert_eq!(problem_in(body), format!("bad.star:2: {wanted}"), "{body}");
+        assert_eq!(problem_in(body), format!("bad.star:2:5: {wanted}"), "{body}");
     }
     for (body, wanted) in [
         ("press(x_mm = 1.0, depths_mm = [0.2])", "y_mm"),
@@ -78,7 +78,7 @@ fn arguments_that_make_no_sense_anywhere_are_refused_before_the_host_sees_them()
         ("x = [1][5]", "Index"),
     ] {
         let problem = problem_in(body);
-        assert!(problem.starts_with("bad.star:2: ") && problem.contains(wanted), "{body}: {problem}");
+        assert!(problem.starts_with("bad.star:2:") && problem.contains(wanted), "{body}: {problem}");
     }
 }
 
@@ -86,19 +86,19 @@ fn arguments_that_make_no_sense_anywhere_are_refused_before_the_host_sees_them()
 fn the_top_level_declares_and_does_nothing() {
     assert_eq!(
         problem("tare()\ndef run(rig):\n    pass\n"),
-        "bad.star:1: only run(rig) may do something: the top level declares parameters"
+        "bad.star:1:1: only run(rig) may do something: the top level declares parameters"
     );
     assert_eq!(
         problem("A = param('a', default = 1)\nB = param('a', default = 1)\ndef run(rig):\n    pass\n"),
-        "bad.star:2: the parameter \"a\" is declared twice"
+        "bad.star:2:5: the parameter \"a\" is declared twice"
     );
     assert_eq!(
         problem("A = param('a', default = [])\ndef run(rig):\n    pass\n"),
-        "bad.star:1: a parameter's default list needs at least one value"
+        "bad.star:1:5: a parameter's default list needs at least one value"
     );
-    assert!(problem("def run(rig):\n    pass\nrun = 3\n").starts_with("bad.star:1: "));
+    assert!(problem("def run(rig):\n    pass\nrun = 3\n").starts_with("bad.star:1"));
     assert!(
-        problem("def run():\n    pass\n").starts_with("bad.star:1: "),
+        problem("def run():\n    pass\n").starts_with("bad.star:1"),
         "{}",
         problem("def run():\n    pass\n")
     );
