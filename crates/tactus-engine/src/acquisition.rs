@@ -388,6 +388,7 @@ impl Acquisition {
         self.safety_seq += 1;
         self.record(|sink| sink.safety(&event));
         self.shared.publish.safety(&event);
+        self.shared.safety.send_replace(Some(event));
     }
 
     /// Publishes the state of the run in progress as of now.

@@ -164,6 +164,8 @@ pub(crate) struct Shared {
     pub(crate) pulse: watch::Sender<Pulse>,
     /// The supervisor's fault, kept up to date by the acquisition task.
     pub(crate) fault: watch::Sender<Option<Fault>>,
+    /// What the supervisor did last, kept by the acquisition task.
+    pub(crate) safety: watch::Sender<Option<pb::SafetyEvent>>,
     /// The covering in place, kept up to date by the run.
     pub(crate) covering: watch::Sender<Covering>,
     pub(crate) acquisition: Mailbox,
@@ -212,6 +214,9 @@ impl Drop for AcquisitionTask {
     }
 }
 
+/// Message of a run that was told to pause and still does a step.
+const PAUSES_SOON: &str = "pauses before its next step";
+
 /// Coverings that differ by less, in mm, are the same.
 pub(crate) const SAME_COVERING_MM: f64 = 1e-6;
 
@@ -252,6 +257,7 @@ impl Engine {
             state: watch::Sender::new(idle),
             pulse: watch::Sender::default(),
             fault: watch::Sender::new(supervisor.fault()),
+            safety: watch::Sender::default(),
             covering: watch::Sender::new(covering),
             acquisition: mailbox,
             permits: supervisor.revocation(),
@@ -370,6 +376,11 @@ impl Engine {
         self.shared.fault.borrow().clone()
     }
 
+    /// What the safety supervisor did last; `None` if it did nothing since the start.
+    pub fn safety(&self) -> Option<pb::SafetyEvent> {
+        self.shared.safety.borrow().clone()
+    }
+
     /// Pauses the run in progress before its next step. Every press ends at the safe height, so a paused run does not
     /// press.
     ///
@@ -384,6 +395,7 @@ impl Engine {
             }
             holds
         });
+        self.tell_while_running(PAUSES_SOON);
         claimed
     }
 
@@ -411,7 +423,25 @@ impl Engine {
             }
             refused.is_none()
         });
-        refused.map_or(Ok(()), Err)
+        if let Some(refused) = refused {
+            return Err(refused);
+        }
+        self.tell_while_running("");
+        Ok(())
+    }
+
+    /// Says in the state of a run that has not paused yet whether it will.
+    fn tell_while_running(&self, message: &str) {
+        let told = self.shared.state.send_if_modified(|state| {
+            let is_news = state.phase() == pb::RunPhase::Running && state.message != message;
+            if is_news {
+                message.clone_into(&mut state.message);
+            }
+            is_news
+        });
+        if told {
+            self.shared.publish.state(&self.shared.state.borrow());
+        }
     }
 
     /// Records in the run in progress that somebody took the lease over.
@@ -479,6 +509,7 @@ impl From<Broken> for ResetError {
             | Broken::Disturbed
             | Broken::SensorSilent(_)
             | Broken::StageSilent(..)
+            | Broken::RepeatedInVain { .. }
             | Broken::Script(_)
             | Broken::Refused(_) => Self::NotReady(broken.to_string()),
         }

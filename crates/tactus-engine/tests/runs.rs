@@ -214,6 +214,7 @@ async fn a_pause_comes_between_steps_with_the_tip_up_and_resuming_does_every_pre
     let run = start(&bench, PRESSES, &memory);
     until_deep(&mut bench, 0.2).await;
     assert!(bench.engine.pause("who pauses"));
+    assert_eq!(bench.engine.run_state().message, "pauses before its next step");
     until_phase(&bench, RunPhase::Paused).await;
     assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
     bench.engine.resume("who resumes", None).unwrap();
@@ -258,6 +259,25 @@ async fn a_press_in_which_frames_were_lost_is_repeated_under_a_new_index() {
     assert!(kinds.iter().any(|kind| matches!(kind, Event::Gap(gap) if gap.frames_lost == 2)));
     assert!(kinds.iter().any(|kind| matches!(kind, Event::PressRepeated(repeated) if repeated.press == 0)));
     assert!(kinds.iter().any(|kind| matches!(kind, Event::DwellDone(dwell) if dwell.press == 1)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_press_that_is_repeated_in_vain_fails_the_run_and_says_how_often() {
+    let mut bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let run = start(&bench, HOLD, &memory);
+    for _ in 0..4 {
+        until_deep(&mut bench, 0.3).await;
+        sleep(Duration::from_secs(1)).await;
+        bench.trouble.lock().unwrap().lose = 2;
+        bench.stage.wait_for(|stage| stage.z_mm > 1.9).await.unwrap();
+    }
+    let outcome = run.await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Failed);
+    let says = "the press was repeated 3 times, and something was lost each time; the last time: 2 frames";
+    assert!(outcome.message.contains(says), "{}", outcome.message);
+    let repeated = memory.kinds().into_iter().filter(|kind| matches!(kind, Event::PressRepeated(_)));
+    assert_eq!(repeated.count(), 3);
 }
 
 #[tokio::test(start_paused = true)]

@@ -483,6 +483,14 @@ pub struct CommandReply {
     pub lease: ::core::option::Option<Lease>,
     #[prost(string, tag = "10")]
     pub note: ::prost::alloc::string::String,
+    #[prost(string, tag = "11")]
+    pub rig_toml: ::prost::alloc::string::String,
+    #[prost(double, tag = "12")]
+    pub covering_mm: f64,
+    #[prost(double, tag = "13")]
+    pub depth_max_mm: f64,
+    #[prost(message, optional, tag = "14")]
+    pub safety: ::core::option::Option<SafetyEvent>,
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use tactus_bus::{CommandCall, Publisher, Request};
 use tactus_engine::{Engine, ResetError, ResumeError, RunOrder, StopOrder};
@@ -19,6 +20,7 @@ use tactus_runner::{experiments, twin};
 use tactus_schema::key::Command;
 use tactus_schema::{MonoTime, Rig, WallTime, pb};
 use tokio::sync::{mpsc, watch};
+use tokio::time::timeout;
 use tracing::{info, warn};
 
 use super::health::health;
@@ -31,6 +33,9 @@ mod exit {
     pub(super) const REFUSED: u32 = 4;
     pub(super) const NOT_NOW: u32 = 5;
 }
+
+/// Longest time in which a resumed run goes on.
+const RESUME_PATIENCE: Duration = Duration::from_secs(2);
 
 /// Answers commands for one engine.
 pub(super) struct CommandDesk {
@@ -134,9 +139,16 @@ impl CommandDesk {
                     call.reply.reply(self.reply(self.pause(&request)));
                 }
                 (Command::Resume, Request::Control(request)) => {
-                    call.reply.reply(self.reply(self.resume(&request)));
+                    let desk = Arc::clone(&self);
+                    tokio::spawn(async move {
+                        let done = desk.resume(&request).await;
+                        call.reply.reply(desk.reply(done));
+                    });
                 }
-                (Command::Status, Request::Control(_)) => call.reply.reply(self.reply(Ok(()))),
+                (Command::Status, Request::Control(_)) => {
+                    let rig_toml = self.config.rig.texts.rig_toml.clone();
+                    call.reply.reply(pb::CommandReply { rig_toml, ..self.reply(Ok(())) });
+                }
                 // The bus decodes each command's own request, and gives stops to `answer_stops`.
                 (command, request) => {
                     warn!(?command, ?request, "a command with another command's request");
@@ -153,13 +165,19 @@ impl CommandDesk {
         if self.engine.pause(&request.who) { Ok(()) } else { Err(Refusal::failed("no run is in progress")) }
     }
 
-    fn resume(&self, request: &pb::CommandRequest) -> Result<(), Refusal> {
+    /// Returns when the run goes on, so that the answer's state is the new one.
+    async fn resume(&self, request: &pb::CommandRequest) -> Result<(), Refusal> {
         self.want_lease(&request.lease)?;
         info!(by = request.who, "resume");
+        let mut state = self.engine.state();
         self.engine.resume(&request.who, request.covering_mm).map_err(|error| match error {
             ResumeError::NotPaused => Refusal::failed(error),
             ResumeError::CoveringNotConfirmed { .. } => Refusal::usage(error),
-        })
+        })?;
+        let goes_on = state.wait_for(|state| state.phase() != pb::RunPhase::Paused);
+        // Somebody may have paused it again: then the state says so.
+        let _went_on = timeout(RESUME_PATIENCE, goes_on).await;
+        Ok(())
     }
 
     /// Refuses a command of a client that does not hold the lease.
@@ -306,17 +324,22 @@ impl CommandDesk {
             Ok(()) => (true, String::new(), 0),
             Err(Refusal { exit_code, error }) => (false, error, exit_code),
         };
+        let rig = self.engine.rig();
         pb::CommandReply {
             ok,
             error,
             exit_code,
             state: Some(self.engine.run_state()),
-            rig: self.engine.rig().name.clone(),
+            rig: rig.name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             stage: Some(self.engine.stage_state()),
             health: Some(health(&self.engine, &self.publisher, (0, MonoTime::default()))),
             lease: Some(told(&self.lease(), self.engine.clock().now().mono)),
             note: String::new(),
+            rig_toml: String::new(),
+            covering_mm: rig.covering.thickness_mm,
+            depth_max_mm: rig.depth_max_mm().unwrap_or_default(),
+            safety: self.engine.safety(),
         }
     }
 }

@@ -40,6 +40,8 @@ pub(crate) enum Broken {
     SensorSilent(f64),
     #[error("no answer from the stage for {0:.1} s: {1}")]
     StageSilent(f64, StageError),
+    #[error("{what} was repeated {times} times, and something was lost each time; the last time: {last}")]
+    RepeatedInVain { what: &'static str, times: u32, last: Box<Self> },
     #[error("{0}")]
     Script(String),
     #[error("{0}")]
@@ -74,7 +76,8 @@ pub(super) fn refusal(broken: &Broken) -> Refusal {
     match broken {
         Broken::Ended(_) => Refusal::Stopped(broken.to_string()),
         Broken::Outside(outside) => Refusal::Outside(outside.to_string()),
-        Broken::Stage(_)
+        Broken::RepeatedInVain { .. }
+        | Broken::Stage(_)
         | Broken::Denied(_)
         | Broken::Gone(_)
         | Broken::FramesLost(_)
@@ -99,14 +102,19 @@ pub(super) fn done(frames_lost: u64) -> (pb::ExitStatus, String) {
 
 /// The exit status of a run that ended early, and the reason for a person.
 pub(super) fn verdict(broken: &Broken) -> (pb::ExitStatus, String) {
+    (exit_status(broken), broken.to_string())
+}
+
+fn exit_status(broken: &Broken) -> pb::ExitStatus {
     use pb::ExitStatus;
-    let status = match broken {
+    match broken {
         Broken::Ended(Ending::Stop(order)) if order.abort => ExitStatus::Aborted,
         Broken::Ended(Ending::Stop(_)) => ExitStatus::Stopped,
         Broken::Ended(ending) if ending.is_silence() => ExitStatus::Failed,
         Broken::Ended(Ending::Safety(_)) | Broken::Outside(_) | Broken::Refused(_) | Broken::Denied(_) => {
             ExitStatus::Refused
         }
+        Broken::RepeatedInVain { last, .. } => exit_status(last),
         Broken::Ended(Ending::FramesLost(_) | Ending::RecordFailed(_) | Ending::Defect(_))
         | Broken::Stage(_)
         | Broken::Gone(_)
@@ -115,6 +123,5 @@ pub(super) fn verdict(broken: &Broken) -> (pb::ExitStatus, String) {
         | Broken::SensorSilent(_)
         | Broken::StageSilent(..)
         | Broken::Script(_) => ExitStatus::Failed,
-    };
-    (status, broken.to_string())
+    }
 }

@@ -128,13 +128,18 @@ impl Run {
                 }
                 Err(broken) => broken,
             };
-            if repeats == REPEATS_MAX || !self.may_repeat(&broken) {
+            if !self.may_repeat(&broken) {
                 return Err(broken);
+            }
+            if repeats == REPEATS_MAX {
+                return Err(in_vain("the press", broken));
             }
             repeats += 1;
             warn!(press = index, %broken, "press broken off; it will be repeated");
             self.emit(Event::PressRepeated(pb::PressRepeated { press: index, reason: broken.to_string() }))
                 .await;
+            let told = format!("repeats a press, {repeats} of at most {REPEATS_MAX} times: {broken}");
+            self.set_state(pb::RunPhase::Running, &told).await;
             self.recover().await?;
         }
     }
@@ -347,8 +352,11 @@ impl Run {
                 Ok(average) => return Ok(average),
                 Err(broken) => broken,
             };
-            if repeats == REPEATS_MAX || !self.may_repeat(&broken) {
+            if !self.may_repeat(&broken) {
                 return Err(broken);
+            }
+            if repeats == REPEATS_MAX {
+                return Err(in_vain("the reading", broken));
             }
             repeats += 1;
             warn!(%broken, "average broken off; it will be repeated");
@@ -417,6 +425,11 @@ impl Run {
             *range = [range[0].min(value), range[1].max(value)];
         }
     }
+}
+
+/// Why a step fails after its last repetition.
+fn in_vain(what: &'static str, last: Broken) -> Broken {
+    Broken::RepeatedInVain { what, times: REPEATS_MAX, last: Box::new(last) }
 }
 
 #[expect(
