@@ -6,8 +6,6 @@ use std::fs;
 use tactus_e2e::{repository, tactus};
 use tempfile::TempDir;
 
-const NOWHERE: [&str; 2] = ["--endpoint", "tcp/127.0.0.1:1"];
-
 #[test]
 fn a_script_that_presses_too_deep_is_refused_with_its_line_and_nothing_is_recorded() {
     let folder = TempDir::new().unwrap();
@@ -17,7 +15,7 @@ fn a_script_that_presses_too_deep_is_refused_with_its_line_and_nothing_is_record
     )
     .unwrap();
     for command in ["run", "plan"] {
-        let said = tactus(folder.path(), &[&NOWHERE[..], &[command, "deep.star"]].concat());
+        let said = tactus(folder.path(), &[command, "deep.star", "--embedded"]);
         assert_eq!(said.code, Some(4), "{said:?}");
         let text = format!("{}{}", said.out, said.err);
         assert!(
@@ -39,7 +37,7 @@ fn a_script_with_an_error_is_refused_with_its_line() {
         ("load(\"//etc/passwd\", \"x\")\ndef run(rig):\n    pass\n", "bad.star:1", "load"),
     ] {
         fs::write(folder.path().join("bad.star"), source).unwrap();
-        let said = tactus(folder.path(), &["plan", "bad.star"]);
+        let said = tactus(folder.path(), &["plan", "bad.star", "--embedded"]);
         assert!(matches!(said.code, Some(1 | 2)), "{source}: {said:?}");
         let text = format!("{}{}", said.out, said.err);
         assert!(text.contains(line) && text.to_lowercase().contains(word), "{source}: {text}");
@@ -75,8 +73,7 @@ fn a_recording_cut_short_is_told_and_recovered() {
         "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2, 0.3])\n    wait(60)\n",
     )
     .unwrap();
-    let summary =
-        tactus(folder.path(), &[&NOWHERE[..], &["--json", "run", "one.star", "--no-report"]].concat()).json();
+    let summary = tactus(folder.path(), &["--json", "run", "one.star", "--embedded", "--no-report"]).json();
     // A third of the file ends within the frames: the summary with its schemas takes about 120 kB, the frames of
     // this run twice that.
     let whole = fs::read(summary["recording"].as_str().unwrap()).unwrap();

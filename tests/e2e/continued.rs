@@ -165,12 +165,8 @@ fn after_kill_9_in_a_press_the_run_goes_on_and_each_press_is_in_the_table_once()
 fn a_killed_run_of_the_embedded_rig_goes_on_in_its_folder() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("five.star"), PRESSES).unwrap();
-    let nobody = ["--endpoint", "tcp/127.0.0.1:1"];
-    let embedded = Process::start(
-        "tactus",
-        folder.path(),
-        &[&nobody[..], &["run", "five.star", "--real-time"]].concat(),
-    );
+    let embedded =
+        Process::start("tactus", folder.path(), &["run", "five.star", "--embedded", "--real-time"]);
     let runs = folder.path().join("runs");
     let deadline = Instant::now() + DEADLINE;
     let first = loop {
@@ -187,7 +183,7 @@ fn a_killed_run_of_the_embedded_rig_goes_on_in_its_folder() {
     fs::write(folder.path().join("five.star"), PRESSES.replace("0.4", "0.5")).unwrap();
     let run_id = id(&first);
     let go_on = |args: &[&str]| {
-        tactus(folder.path(), &[&nobody[..], &["--json", "run", "--continue", &run_id], args].concat())
+        tactus(folder.path(), &[&["--json", "run", "--embedded", "--continue", &run_id], args].concat())
     };
     for (args, says) in [
         (&["five.star"][..], "cannot be used with"),

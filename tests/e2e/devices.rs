@@ -38,12 +38,32 @@ fn what_a_rig_means_and_is_not_there_is_told() {
         let said = tactus(folder.path(), &[&["devices"], arguments.as_slice()].concat());
         assert_eq!(said.code, Some(0), "{said:?}");
         assert!(said.out.contains("The sensor of rig \"sim\" is not there: usb:1209:ffff/none"), "{said:?}");
+        assert!(said.out.contains("The stage of rig \"sim\" is simulated: it needs no device"), "{said:?}");
         let said = tactus(folder.path(), &[&["devices", "--json"], arguments.as_slice()].concat());
         assert_eq!(said.json()["missing"][0]["role"], "sensor");
     }
     let said = tactus(folder.path(), &["devices", "--rig", "none.toml"]);
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.err.contains("none.toml"), "{said:?}");
+}
+
+#[test]
+fn a_rig_is_named_by_its_name_too_and_one_that_is_not_there_is_an_error() {
+    let folder = TempDir::new().unwrap();
+    fs::create_dir_all(folder.path().join("config/rigs")).unwrap();
+    let rig = fs::read_to_string(repository("config/rigs/pty.toml")).unwrap();
+    fs::write(folder.path().join("config/rigs/pty.toml"), &rig).unwrap();
+    fs::create_dir_all(folder.path().join("mock")).unwrap();
+    fs::write(folder.path().join("mock/sensor"), "").unwrap();
+    let said = tactus(folder.path(), &["devices", "--rig", "bench"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(said.out.contains("The sensor of rig \"bench\" is there: mock/sensor"), "{said:?}");
+    assert!(said.out.contains("The stage of rig \"bench\" is not there: mock/stage"), "{said:?}");
+    let told = tactus(folder.path(), &["devices", "--rig", "bench", "--json"]).json();
+    assert_eq!((&told["named"][0]["there"], &told["named"][1]["there"]), (&true.into(), &false.into()));
+    let said = tactus(folder.path(), &["devices", "--rig", "nosuch"]);
+    assert_eq!(said.code, Some(2), "{said:?}");
+    assert!(said.err.contains("no rig \"nosuch\"") && said.err.contains("there is: bench"), "{said:?}");
 }
 
 #[test]

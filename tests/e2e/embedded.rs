@@ -20,7 +20,7 @@ def run(rig):
 "#;
 
 fn run(folder: &Path, args: &[&str]) -> Value {
-    let said = tactus(folder, &[&["--endpoint", "tcp/127.0.0.1:1", "--json", "run"], args].concat());
+    let said = tactus(folder, &[&["--json", "run", "--embedded"], args].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
     said.json()
 }
@@ -52,16 +52,35 @@ fn element_centres_presses_all_elements_and_ends_with_a_recording_and_a_report()
 }
 
 #[test]
-fn without_a_service_the_first_line_says_that_it_is_simulated() {
+fn the_first_line_says_that_it_is_simulated() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("two.star"), TWO_PRESSES).unwrap();
-    let said = tactus(folder.path(), &["--endpoint", "tcp/127.0.0.1:1", "run", "two.star", "--no-report"]);
+    let said = tactus(folder.path(), &["run", "two.star", "--embedded", "--no-report"]);
     assert_eq!(said.code, Some(0), "{said:?}");
     let first = said.out.lines().next().unwrap();
-    assert!(
-        first.contains("SIMULATED") && first.contains("embedded") && first.contains("no service"),
-        "{first}"
-    );
+    assert!(first.contains("SIMULATED") && first.contains("embedded"), "{first}");
+}
+
+#[test]
+fn a_service_that_is_named_and_dead_is_an_error_and_nothing_is_simulated() {
+    let folder = TempDir::new().unwrap();
+    let dead = "tcp/127.0.0.1:1";
+    for command in [
+        &["run", "corners"][..],
+        &["plan", "corners"],
+        &["study"],
+        &["discover", "--active"],
+        &["run", "--continue", "20260101-000000-corners-0000"],
+    ] {
+        let said = tactus(folder.path(), &[&["--endpoint", dead], command].concat());
+        assert_eq!(said.code, Some(1), "{said:?}");
+        let says = said.err.contains(&format!("no service at {dead}")) && said.err.contains("--embedded");
+        assert!(says && !said.out.contains("SIMULATED"), "{said:?}");
+    }
+    assert!(!folder.path().join("runs").exists());
+    let said = tactus(folder.path(), &["--endpoint", dead, "plan", "corners", "--embedded"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(said.out.contains("embedded, as asked"), "{said:?}");
 }
 
 #[test]
@@ -205,7 +224,7 @@ fn a_truth_that_cannot_be_names_its_fault_and_nothing_runs() {
 #[test]
 fn plan_promises_what_run_then_does() {
     let folder = TempDir::new().unwrap();
-    let plan = tactus(folder.path(), &["--json", "plan", "element-centres"]);
+    let plan = tactus(folder.path(), &["--json", "plan", "element-centres", "--embedded"]);
     assert_eq!(plan.code, Some(0), "{plan:?}");
     let plan = plan.json();
     assert_eq!((&plan["presses"], &plan["dwells"]), (&48.into(), &240.into()));

@@ -13,6 +13,7 @@ mod effects;
 mod embedded;
 mod kill_trials;
 mod link;
+mod runs;
 mod scripts;
 mod service;
 mod signals;

@@ -192,6 +192,23 @@ fn where_the_policy_says_fail_a_lost_sensor_fails_the_run_with_the_tip_up() {
 }
 
 #[test]
+fn a_plan_is_for_the_rig_that_would_run_it_with_the_covering_in_place() {
+    let lab = ServiceUnderTest::start(|rig| {
+        let rig = rig.replace("x_mm = [10.0, 50.0]", "x_mm = [10.0, 30.0]");
+        assert!(rig.contains("[10.0, 30.0]"), "the rig file has changed");
+        rig
+    });
+    let far = lab.script("far.star", "def run(rig):\n    press(14.0, 5.0, depths_mm = [0.2])\n");
+    let said = lab.tactus(&["--json", "plan", &far]);
+    assert_eq!(said.code, Some(4), "{said:?}");
+    let plan = said.json();
+    assert_eq!((&plan["possible"], &plan["rig"]), (&false.into(), &"bench".into()));
+    assert_eq!(plan["rig_of"], format!("of the service at {}", lab.endpoint));
+    assert_eq!(lab.tactus(&["run", &far]).code, Some(4), "a run agrees with its plan");
+    assert_eq!(lab.tactus(&["plan", &far, "--embedded"]).code, Some(0));
+}
+
+#[test]
 fn stop_pause_and_resume_work_from_another_client() {
     let lab = ServiceUnderTest::start(|rig| rig);
     assert_eq!(lab.tactus(&["pause"]).code, Some(1), "no run can be paused");
@@ -204,7 +221,10 @@ fn stop_pause_and_resume_work_from_another_client() {
     let held = lab.tactus(&["pause"]);
     assert_eq!(held.code, Some(5), "the client that runs the experiment holds the lease: {held:?}");
     assert!(held.err.contains("holds the lease") && held.err.contains("--take-over"), "{held:?}");
-    assert_eq!(lab.tactus(&["pause", "--take-over", "to look"]).code, Some(0));
+    let pause = lab.tactus(&["pause", "--take-over", "to look"]);
+    assert_eq!(pause.code, Some(0));
+    let pauses = ["pauses before its next step", "paused: `tactus resume` goes on"];
+    assert!(pauses.iter().any(|words| pause.out.contains(words)), "{pause:?}");
     let paused = loop {
         let status = status(&lab);
         if status["run"]["phase"] == "paused" {
@@ -213,11 +233,16 @@ fn stop_pause_and_resume_work_from_another_client() {
     };
     assert!(paused["stage"]["z_mm"].as_f64().unwrap() > 1.9, "a paused rig presses nothing: {paused}");
     assert_eq!(lab.tactus(&["run", &script]).code, Some(5), "one run at a time");
-    assert_eq!(lab.tactus(&["resume"]).code, Some(0));
+    let resumed = lab.tactus(&["resume"]);
+    assert_eq!(resumed.code, Some(0));
+    assert!(resumed.out.contains(": running;") && !resumed.out.contains("paused"), "{resumed:?}");
     wait_until_pressing(&lab);
     assert_eq!(lab.tactus(&["stop", "--abort", "--reason", "wrong covering"]).code, Some(0));
     let (code, said) = client.wait();
     assert_eq!(code, Some(1), "{said}");
+    let after = lab.tactus(&["status"]);
+    assert!(after.out.contains(": aborted by ") && !after.out.contains("aborted aborted"), "{after:?}");
+    assert!(after.out.contains("safety") && after.out.contains("depth limit 0.711 mm under the 1.016 mm"));
     let events = events(&recording(&lab));
     let Some(Event::Finished(finished)) = events.last() else { panic!("{events:?}") };
     assert_eq!(finished.exit_status(), pb::ExitStatus::Aborted);

@@ -124,6 +124,47 @@ fn a_stage_that_the_service_holds_is_left_alone() {
 }
 
 #[test]
+fn a_folder_of_links_belongs_to_one_virtual_rig() {
+    let folder = TempDir::new().unwrap();
+    let _first = served(folder.path(), "protocol = \"grbl\"\n");
+    let links = ["sensor", "stage"].map(|link| folder.path().join("mock").join(link));
+    let before = links.clone().map(|link| fs::read_link(link).unwrap());
+    let args = ["rig", "--config", "rig.toml", "--link-dir", "mock"];
+    let (code, said) = Process::start("tactus-mock", folder.path(), &args).wait();
+    assert_eq!(code, Some(1), "{said}");
+    assert!(
+        said.contains("another virtual rig has its links in mock") && said.contains("--link-dir"),
+        "{said}"
+    );
+    assert_eq!(links.map(|link| fs::read_link(link).unwrap()), before);
+}
+
+#[test]
+fn a_service_of_another_rig_holds_another_stage() {
+    let folder = TempDir::new().unwrap();
+    let _mock = served(folder.path(), "protocol = \"grbl\"\n");
+    // It is never ready, because its devices do not exist; a service that is not ready lists no rig.
+    let rig = fs::read_to_string(repository("config/rigs/pty.toml")).unwrap();
+    let other = rig.replace("\"mock/", "\"none/").replace("name = \"bench\"", "name = \"other\"");
+    fs::write(folder.path().join("other.toml"), other).unwrap();
+    let endpoint = free_endpoint();
+    let config = format!("rig = \"other.toml\"\nrecordings = \"runs\"\n[bus]\nlisten = [\"{endpoint}\"]\n");
+    fs::write(folder.path().join("tactusd.toml"), config).unwrap();
+    let mut daemon = Process::start("tactusd", folder.path(), &["--config", "tactusd.toml"]);
+    daemon.wait_for("tactusd starts");
+    // It answers soon after that line.
+    while tactus(folder.path(), &["--endpoint", &endpoint, "--rig", "other", "status"]).code != Some(0) {}
+    let check = ["--endpoint", &endpoint, "stage", "check", "--rig", "rig.toml", "--home", "--yes"];
+    let said = tactus(folder.path(), &check);
+    assert_eq!(said.code, Some(0), "{said:?}");
+
+    // Who names a rig that is not served learns at once which are.
+    let said = tactus(folder.path(), &["--endpoint", &endpoint, "--rig", "nosuch", "status"]);
+    assert_eq!(said.code, Some(2), "{said:?}");
+    assert!(said.err.contains("no rig \"nosuch\" at") && said.err.contains("there is: other"), "{said:?}");
+}
+
+#[test]
 fn a_service_presses_with_a_stage_that_speaks_zaber() {
     let lab = ServiceUnderTest::start(|rig| rig.replace("protocol = \"grbl\"\n", ZABER));
     let script = lab.script(

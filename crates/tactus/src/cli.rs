@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::builder::NonEmptyStringValueParser;
-use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::parser::ValueSource;
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use tactus_bus::{Credentials, Endpoint};
 use tactus_log::LogFormat;
@@ -27,7 +28,7 @@ struct Cli {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Common {
     /// Address of the service: tcp/HOST:PORT, tls/HOST:PORT or unixsock-stream/PATH. Default: the socket of the installed service if it
-    /// has one, else loopback.
+    /// has one, else loopback. If it is given and nothing answers there, that is an error.
     #[arg(
         long,
         global = true,
@@ -36,6 +37,9 @@ pub(crate) struct Common {
         env = "TACTUS_ENDPOINT"
     )]
     pub(crate) endpoint: String,
+    /// True if the command line or the environment gave the endpoint.
+    #[arg(skip)]
+    pub(crate) is_endpoint_given: bool,
     /// Folder with authority.pem, client.pem and client.key, for a service at tls/HOST:PORT.
     #[arg(long, global = true, value_name = "DIR", env = "TACTUS_CERTIFICATES")]
     pub(crate) certificates: Option<PathBuf>,
@@ -58,8 +62,15 @@ impl Common {
 enum CliCommand {
     /// Run an experiment. Without a service it runs on the embedded simulated rig.
     Run(RunArgs),
-    /// Show what an experiment would do: parameters, presses, duration, travel, or the refused step.
+    /// Show what an experiment would do on the rig that would run it: parameters, presses, duration, travel, or the refused step.
     Plan(PlanArgs),
+    /// List the experiments with their parameters, or explain one.
+    Experiments(ExperimentsArgs),
+    /// Write an experiment script to start from.
+    New(NewArgs),
+    /// What experiment scripts can say.
+    #[command(subcommand)]
+    Script(ScriptCommand),
     /// Show what the service is doing.
     Status,
     /// Stop motion now, retract and end the run.
@@ -72,10 +83,14 @@ enum CliCommand {
     Reset(LeaseArgs),
     /// Show the image, the stage and the run live.
     Watch,
+    /// List and search the recorded runs; tag them, write notes, compare them.
+    Runs(RunsArgs),
+    /// Make an earlier run again, with its script, parameters and seed.
+    Rerun(RerunArgs),
     /// Inspect recordings.
     #[command(subcommand)]
     Record(RecordCommand),
-    /// Write the measurement table (Parquet) of recordings.
+    /// Write the measurement table of recordings: Parquet, CSV or NumPy arrays.
     Export(ExportArgs),
     /// Repair a recording that was cut off or is damaged.
     Recover(RecoverArgs),
@@ -257,9 +272,38 @@ pub(crate) struct ResumeArgs {
 pub(crate) struct PlanArgs {
     #[command(flatten)]
     pub(crate) experiment: ExperimentArgs,
-    /// The rig's file, instead of the shipped simulated rig.
-    #[arg(long, value_name = "FILE")]
+    /// Plan for the embedded simulated rig even if a service is running.
+    #[arg(long)]
+    pub(crate) embedded: bool,
+    /// The rig's file, instead of the rig that would run it.
+    #[arg(long, value_name = "FILE", conflicts_with = "embedded")]
     pub(crate) rig_file: Option<PathBuf>,
+}
+
+/// Arguments of `experiments`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ExperimentsArgs {
+    /// Name of an experiment, or path of a .star file; without it all are listed.
+    pub(crate) name: Option<String>,
+    /// Folder of the lab's own experiments (.star), listed too.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) experiments: Option<PathBuf>,
+}
+
+/// Arguments of `new`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct NewArgs {
+    /// Name of the experiment: letters, digits, '-' and '_'.
+    pub(crate) name: String,
+    /// Folder in which NAME.star is written.
+    #[arg(short, long, value_name = "DIR", default_value = ".")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Subcommand)]
+enum ScriptCommand {
+    /// Print the functions that scripts can call, with what they do.
+    Reference,
 }
 
 /// Arguments of `stop`.
@@ -273,12 +317,91 @@ pub(crate) struct StopArgs {
     pub(crate) reason: String,
 }
 
+/// Arguments of `runs`.
+#[derive(Debug, Clone, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub(crate) struct RunsArgs {
+    /// Words to search for: in id, experiment, rig, person, date, status, message, tags and note. All must be there.
+    pub(crate) words: Vec<String>,
+    /// Only runs with this tag; may be repeated.
+    #[arg(long, value_name = "TAG")]
+    pub(crate) tag: Vec<String>,
+    /// Folder of the recordings.
+    #[arg(long, global = true, value_name = "DIR", default_value = "runs")]
+    pub(crate) runs: PathBuf,
+    #[command(subcommand)]
+    pub(crate) command: Option<RunsCommand>,
+}
+
+/// What to do with runs, each named by its id or a part that only one has.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum RunsCommand {
+    /// Add tags to a run, in `notes.toml` beside its recording.
+    Tag {
+        /// Id of the run.
+        run: String,
+        /// Single words.
+        #[arg(required = true, value_parser = commands::runs::tag)]
+        tags: Vec<String>,
+        /// Remove them instead.
+        #[arg(long)]
+        remove: bool,
+    },
+    /// Write a note about a run, in `notes.toml` beside its recording. It replaces the earlier one.
+    Note {
+        /// Id of the run.
+        run: String,
+        /// The note; an empty one removes it.
+        text: String,
+    },
+    /// Show in which settings and results runs differ.
+    Compare {
+        /// Ids of the runs.
+        #[arg(required = true, num_args = 2.., value_name = "RUN")]
+        ids: Vec<String>,
+    },
+}
+
+/// Arguments of `rerun`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RerunArgs {
+    /// Id of the run, or a part that only one has.
+    pub(crate) run: String,
+    /// Folder of the recordings.
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    pub(crate) runs: PathBuf,
+    /// Use the embedded simulated rig even if a service is running.
+    #[arg(long)]
+    pub(crate) embedded: bool,
+    /// File of the embedded rig, instead of the shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rig_file: Option<PathBuf>,
+    /// True physics of the embedded rig's sensor, as for `run`.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) truth: Option<PathBuf>,
+    /// Run the embedded rig in real time; the default is virtual time, without waiting.
+    #[arg(long)]
+    pub(crate) real_time: bool,
+    /// Folder in which the new run's folder is created, as for `run`.
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    pub(crate) out: PathBuf,
+    /// Who runs it, for the recording.
+    #[arg(long, env = "USER", default_value = "unknown")]
+    pub(crate) who: String,
+    /// Do not write a report.
+    #[arg(long)]
+    pub(crate) no_report: bool,
+    #[command(flatten)]
+    pub(crate) lease: LeaseArgs,
+}
+
 #[derive(Debug, Subcommand)]
 enum RecordCommand {
-    /// Summarise a recording.
+    /// Summarise recordings: one in full, several as a table.
     Info {
-        /// A .mcap file.
-        file: PathBuf,
+        /// .mcap files.
+        #[arg(required = true, value_name = "RECORDING")]
+        files: Vec<PathBuf>,
     },
 }
 
@@ -288,9 +411,12 @@ pub(crate) struct ExportArgs {
     /// .mcap files.
     #[arg(required = true)]
     pub(crate) recordings: Vec<PathBuf>,
-    /// The table to write; default: beside the first recording.
+    /// The table to write: .parquet, .csv or .npz; default: `table.parquet` beside the first recording.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
+    /// Format of the table; default: as the name of the file ends. Tactus itself reads Parquet only.
+    #[arg(long, value_name = "FORMAT", value_parser = ["parquet", "csv", "npz"])]
+    pub(crate) format: Option<String>,
 }
 
 /// Arguments of `recover`.
@@ -596,7 +722,11 @@ pub(crate) struct ValidateArgs {
 
 /// Runs `tactus` with the process's arguments.
 pub fn main() -> ExitCode {
-    let Cli { common, command } = Cli::parse();
+    let given = Cli::command().get_matches();
+    let Cli { common, command } = Cli::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
+    let source = given.value_source("endpoint");
+    let is_endpoint_given = source.is_some_and(|source| source != ValueSource::DefaultValue);
+    let common = Common { is_endpoint_given, ..common };
     // At the terminal only warnings matter; scripts log through the service.
     let _log = tactus_log::start(LogFormat::Text, "warn,zenoh=error,zenoh_transport=error");
     match dispatch(&common, command) {
@@ -617,13 +747,18 @@ fn dispatch(common: &Common, command: CliCommand) -> anyhow::Result<Exit> {
     match command {
         CliCommand::Run(args) => commands::run::run(common, &args),
         CliCommand::Plan(args) => commands::plan::plan(common, &args),
+        CliCommand::Experiments(args) => commands::experiments::experiments(common, &args),
+        CliCommand::New(args) => commands::experiments::new(common, &args),
+        CliCommand::Script(ScriptCommand::Reference) => commands::experiments::reference(common),
         CliCommand::Status => commands::control::status(common),
         CliCommand::Stop(args) => commands::control::stop(common, &args),
         CliCommand::Pause(args) => commands::control::pause(common, &args),
         CliCommand::Resume(args) => commands::control::resume(common, &args),
         CliCommand::Reset(args) => commands::control::reset(common, &args),
         CliCommand::Watch => commands::watch::watch(common),
-        CliCommand::Record(RecordCommand::Info { file }) => commands::files::info(common, &file),
+        CliCommand::Runs(args) => commands::runs::runs(common, &args),
+        CliCommand::Rerun(args) => commands::runs::rerun(common, &args),
+        CliCommand::Record(RecordCommand::Info { files }) => commands::files::info(common, &files),
         CliCommand::Export(args) => commands::files::export(common, &args),
         CliCommand::Recover(args) => commands::files::recover(common, &args),
         CliCommand::Report(args) => commands::files::report(common, &args),

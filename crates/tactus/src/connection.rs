@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use tactus_bus::{BusError, Client, Endpoint, HeldLease, Hold};
 use tactus_schema::key::Command;
 use tactus_schema::{Message, pb};
@@ -58,13 +58,30 @@ pub(crate) async fn release(held: HeldLease) {
     }
 }
 
-/// The service, or `None` if nothing listens at the endpoint.
+/// The service, or `None` if nothing listens at the default endpoint.
+///
+/// # Errors
+/// If nothing listens at an endpoint that was given: who names a service does not mean the embedded rig.
 pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
+    match look(common).await? {
+        None if common.is_endpoint_given => bail!(
+            "no service at {}: start `tactusd --config FILE`, correct the address (--endpoint or TACTUS_ENDPOINT), or use \
+             the embedded simulated rig with --embedded",
+            common.endpoint
+        ),
+        found => Ok(found),
+    }
+}
+
+/// The service, or `None` if nothing listens at the endpoint.
+pub(crate) async fn look(common: &Common) -> anyhow::Result<Option<Client>> {
     let endpoint = endpoint(common)?;
     match Client::connect_as(&endpoint, common.rig.as_deref(), &common.credentials()).await {
         Ok(client) => Ok(Some(client)),
         Err(BusError::NoService { .. }) => Ok(None),
-        Err(error @ BusError::RigName { .. }) => Err(Failure::new(Exit::Usage, error).into()),
+        Err(error @ (BusError::RigName { .. } | BusError::UnknownRig { .. })) => {
+            Err(Failure::new(Exit::Usage, error).into())
+        }
         Err(error) => Err(error.into()),
     }
 }
@@ -74,7 +91,7 @@ pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
 /// # Errors
 /// If nothing listens at the endpoint.
 pub(crate) async fn require(common: &Common) -> anyhow::Result<Client> {
-    find(common).await?.with_context(|| {
+    look(common).await?.with_context(|| {
         format!(
             "no service at {}: start `tactusd --config FILE`, or give its address with --endpoint",
             common.endpoint

@@ -5,6 +5,8 @@ use std::process::ExitCode;
 
 use tactus_schema::pb::ExitStatus;
 
+use crate::source_line::with_source_line;
+
 /// How the program ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exit {
@@ -64,6 +66,11 @@ impl Exit {
     pub(crate) fn of_error(error: &anyhow::Error) -> Self {
         error.downcast_ref::<Failure>().map_or(Self::Failed, |failure| failure.exit)
     }
+}
+
+/// The error in words, with the line of the script that it names.
+pub(crate) fn at_source(error: &anyhow::Error, name: &str, source: &str) -> anyhow::Error {
+    Failure::new(Exit::of_error(error), with_source_line(&in_words(error), name, source)).into()
 }
 
 /// An error with its causes. A cause that the text contains already is not repeated.

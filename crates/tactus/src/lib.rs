@@ -10,5 +10,6 @@ mod interrupt;
 mod output;
 mod progress;
 mod sha256;
+mod source_line;
 
 pub use cli::main;

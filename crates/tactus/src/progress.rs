@@ -133,6 +133,7 @@ fn show(bar: &ProgressBar, state: &RunState) {
         RunPhase::Preparing => "preparing".into(),
         RunPhase::Paused => state.message.clone(),
         RunPhase::Stopping => format!("{frames}  retracting"),
+        RunPhase::Running if !state.message.is_empty() => format!("{frames}  {}", state.message),
         RunPhase::Unspecified | RunPhase::Idle | RunPhase::Running | RunPhase::Finished => {
             format!("{frames}{left}")
         }

@@ -13,6 +13,11 @@ fn the_help_names_every_command() {
     for command in [
         "run",
         "plan",
+        "experiments",
+        "new",
+        "script",
+        "runs",
+        "rerun",
         "status",
         "stop",
         "pause",

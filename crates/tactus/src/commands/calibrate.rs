@@ -28,8 +28,10 @@ pub(crate) struct Calibrated {
     pub(crate) rig: Rig,
     pub(crate) simulated: bool,
     pub(crate) runs: Vec<RunSource>,
-    /// Defects of the files.
+    /// What to know of the files.
     pub(crate) notes: Vec<String>,
+    /// True if something of the files was lost.
+    pub(crate) is_lossy: bool,
     pub(crate) calibration: Calibration,
 }
 
@@ -53,8 +55,8 @@ pub(crate) fn calibrate(common: &Common, args: &CalibrateArgs) -> anyhow::Result
     } else {
         print::calibrated(&calibrated, &paths);
     }
-    let whole = calibrated.calibration.missing.is_empty() && calibrated.calibration.warnings.is_empty();
-    Ok(if whole && calibrated.notes.is_empty() { Exit::Done } else { Exit::Degraded })
+    let whole = calibrated.calibration.missing.is_empty() && !calibrated.is_lossy;
+    Ok(if whole { Exit::Done } else { Exit::Degraded })
 }
 
 /// Reads the files and calibrates the sensor.
@@ -77,6 +79,7 @@ pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
         rig,
         simulated,
         runs: source.runs,
+        is_lossy: !source.warnings.is_empty(),
         notes: [source.warnings, source.notes, Vec::from_iter(renamed)].concat(),
         calibration,
     })

@@ -112,6 +112,16 @@ fn to_json(reply: &pb::CommandReply) -> Value {
         "simulated": health.simulated,
         "lease": holder(reply).map(|lease| json!({ "holder": lease.holder, "expires_in_s": lease.expires_in_s })),
         "fault": (!state.fault.is_empty()).then_some(&state.fault),
+        "safety": {
+            "depth_max_mm": reply.depth_max_mm,
+            "covering_mm": reply.covering_mm,
+            "last": reply.safety.as_ref().map(|event| json!({
+                "verdict": event.verdict().word(),
+                "rule": event.rule,
+                "detail": event.detail,
+                "t_wall_ns": event.t_wall_ns,
+            })),
+        },
         "run": {
             "run_id": state.run_id,
             "experiment": state.experiment,
@@ -155,21 +165,20 @@ fn print(reply: &pb::CommandReply) {
     let run = match state.phase() {
         pb::RunPhase::Idle | pb::RunPhase::Unspecified => "none since the service started".into(),
         pb::RunPhase::Finished => {
-            format!("{}: {} {}", state.run_id, state.exit_status().word(), state.message)
+            format!("{}: {}", state.run_id, with_message(state.exit_status().word(), &state.message))
         }
         phase @ (pb::RunPhase::Preparing
         | pb::RunPhase::Running
         | pb::RunPhase::Paused
         | pb::RunPhase::Stopping) => format!(
-            "{}: {}, {}/{} presses, {} frames, {} lost, {} left {}",
+            "{}: {}; {}/{} presses, {} frames, {} lost, {} left",
             state.run_id,
-            phase.word(),
+            with_message(phase.word(), &state.message),
             state.presses,
             state.presses_planned,
             state.frames,
             state.frames_lost,
             duration(state.remaining_s.max(0.0)),
-            state.message
         ),
     };
     let sensor = if health.sensor_connected { "connected" } else { "LOST" };
@@ -184,7 +193,7 @@ fn print(reply: &pb::CommandReply) {
         fields.push(("fault", fault_words(&state.fault)));
     }
     fields.extend([
-        ("run", run.trim_end().to_owned()),
+        ("run", run),
         (
             "stage",
             format!(
@@ -195,11 +204,42 @@ fn print(reply: &pb::CommandReply) {
                 stage.z_mm
             ),
         ),
+        ("safety", safety_words(reply)),
         ("sensor", format!("{sensor}, {} frames, {} lost; {clock}", health.frames, health.frames_lost)),
         ("lease", holder(reply).map_or_else(|| "nobody's".to_owned(), |lease| lease.holder.clone())),
         ("service", format!("version {}, up {}", reply.version, duration(health.uptime_s))),
     ]);
     print_fields(&fields);
+}
+
+/// A state of a run and its message, which may begin with the state itself.
+pub(crate) fn with_message(word: &str, message: &str) -> String {
+    if message.is_empty() {
+        word.to_owned()
+    } else if message.starts_with(word) {
+        message.to_owned()
+    } else {
+        format!("{word}: {message}")
+    }
+}
+
+/// The limit of depth, and what the safety supervisor did last.
+fn safety_words(reply: &pb::CommandReply) -> String {
+    let limit =
+        format!("depth limit {:.3} mm under the {} mm covering", reply.depth_max_mm, reply.covering_mm);
+    let health = reply.health.as_ref().map_or(0, |health| health.t_mono_ns);
+    match &reply.safety {
+        Some(event) => {
+            let ago = duration(health.saturating_sub(event.t_mono_ns).max(0) as f64 * 1e-9);
+            format!(
+                "{limit}; last event {ago} ago: {}, {}: {}",
+                event.verdict().word(),
+                event.rule,
+                event.detail
+            )
+        }
+        None => format!("{limit}; no stop and no refusal since the service started"),
+    }
 }
 
 /// The lease, if somebody holds it.

@@ -11,7 +11,7 @@ use tactus_schema::Rig;
 use tactus_schema::rig::{SerialPort, Transport};
 
 use crate::cli::{Common, DevicesArgs};
-use crate::exit::Exit;
+use crate::exit::{Exit, Failure};
 use crate::output::{print_table, say};
 
 pub(crate) fn devices(common: &Common, args: &DevicesArgs) -> anyhow::Result<Exit> {
@@ -34,8 +34,19 @@ struct Rigs {
     links: Vec<Link>,
     /// Errors of files that cannot be read as rig files.
     notes: Vec<String>,
-    /// True if the user gave a file: missing devices are then reported.
+    /// True if the user named a rig or a file: each of its devices is then reported.
     are_named: bool,
+}
+
+/// Whether the device of a link is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Presence {
+    There,
+    Missing,
+    /// It is simulated.
+    Embedded,
+    /// It is behind a network address, which is not looked at.
+    Remote,
 }
 
 #[derive(Debug)]
@@ -48,7 +59,7 @@ struct Link {
 
 impl Rigs {
     fn find(rig: Option<&str>, config: Option<&Path>) -> anyhow::Result<Self> {
-        let mut rigs = Self::default();
+        let mut rigs = Self { are_named: rig.is_some() || config.is_some(), ..Self::default() };
         let file =
             rig.map(Path::new).filter(|rig| rig.extension().is_some_and(|extension| extension == "toml"));
         if let Some(file) = file {
@@ -57,19 +68,30 @@ impl Rigs {
         if let Some(config) = config {
             rigs.add(&ServiceConfig::load(config)?.rig.rig);
         }
-        rigs.are_named = file.is_some() || config.is_some();
-        if !rigs.are_named {
-            for file in FOLDERS.iter().flat_map(|folder| toml_files(Path::new(folder))) {
-                match config::load_rig(&file) {
-                    Ok(RigFiles { rig: found, .. }) if rig.is_none_or(|name| name == found.name) => {
-                        rigs.add(&found);
-                    }
-                    Ok(_) => {}
-                    Err(error) => rigs.notes.push(error.to_string()),
-                }
-            }
+        if file.is_none() && config.is_none() {
+            rigs.search(rig)?;
         }
         Ok(rigs)
+    }
+
+    /// Adds the rigs of the folders, or the one that has this name.
+    fn search(&mut self, name: Option<&str>) -> anyhow::Result<()> {
+        let mut names = Vec::new();
+        for file in FOLDERS.iter().flat_map(|folder| toml_files(Path::new(folder))) {
+            match config::load_rig(&file) {
+                Ok(RigFiles { rig, .. }) => {
+                    if name.is_none_or(|name| name == rig.name) {
+                        self.add(&rig);
+                    }
+                    names.push(rig.name);
+                }
+                Err(error) => self.notes.push(error.to_string()),
+            }
+        }
+        match name.filter(|name| !names.iter().any(|one| one == name)) {
+            Some(name) => Err(Failure::new(Exit::Usage, unknown_rig(name, &names)).into()),
+            None => Ok(()),
+        }
     }
 
     fn add(&mut self, rig: &Rig) {
@@ -84,18 +106,48 @@ impl Rigs {
         self.links.iter().filter(|link| found.is_meant_by(&link.transport))
     }
 
-    /// Devices of the given rigs that are missing.
-    fn missing(&self, found: &[FoundDevice]) -> Vec<&Link> {
-        let is_there = |link: &Link| match &link.transport {
-            Transport::Embedded | Transport::Tcp { .. } => true,
+    /// The links of the named rigs, and whether their devices are there.
+    fn presences(&self, found: &[FoundDevice]) -> Vec<(&Link, Presence)> {
+        let links = self.links.iter().filter(|_| self.are_named);
+        links.map(|link| (link, link.presence(found))).collect()
+    }
+}
+
+impl Link {
+    fn presence(&self, found: &[FoundDevice]) -> Presence {
+        let is_there = match &self.transport {
+            Transport::Embedded => return Presence::Embedded,
+            Transport::Tcp { .. } => return Presence::Remote,
             // Pseudo-terminals are not in the inventory.
             Transport::Serial { port: SerialPort::Path(path), .. } => Path::new(path).exists(),
             Transport::Serial { .. } | Transport::Usb(_) | Transport::Hid(_) => {
-                found.iter().any(|one| one.is_meant_by(&link.transport))
+                found.iter().any(|one| one.is_meant_by(&self.transport))
             }
         };
-        self.links.iter().filter(|link| self.are_named && !is_there(link)).collect()
+        if is_there { Presence::There } else { Presence::Missing }
     }
+
+    fn in_words(&self, presence: Presence) -> String {
+        let Self { rig, role, transport } = self;
+        match presence {
+            Presence::There => format!("The {role} of rig {rig:?} is there: {transport}"),
+            Presence::Missing => format!("The {role} of rig {rig:?} is not there: {transport}"),
+            Presence::Embedded => format!("The {role} of rig {rig:?} is simulated: it needs no device"),
+            Presence::Remote => {
+                format!(
+                    "The {role} of rig {rig:?} is at a network address, which is not looked at: {transport}"
+                )
+            }
+        }
+    }
+}
+
+fn unknown_rig(name: &str, names: &[String]) -> String {
+    let folders = FOLDERS.join(" and ");
+    let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+    format!(
+        "no rig {name:?} in {folders}; there is: {known}. Or give its file: `tactus devices --rig FILE.toml`"
+    )
 }
 
 fn toml_files(folder: &Path) -> Vec<PathBuf> {
@@ -142,9 +194,12 @@ fn print(found: &[FoundDevice], rigs: &Rigs) {
             say(what);
         }
     }
-    for Link { rig, role, transport } in rigs.missing(found) {
+    let presences = rigs.presences(found);
+    if !presences.is_empty() {
         say("");
-        say(&format!("The {role} of rig {rig:?} is not there: {transport}"));
+    }
+    for (link, presence) in presences {
+        say(&link.in_words(presence));
     }
     for note in &rigs.notes {
         eprintln!("tactus: {note}");
@@ -222,9 +277,20 @@ fn to_json(found: &[FoundDevice], rigs: &Rigs) -> Value {
             "rigs": rigs.using(one).map(link).collect::<Vec<_>>(),
         })
     };
+    let presences = rigs.presences(found);
     json!({
         "devices": found.iter().map(device).collect::<Vec<_>>(),
-        "missing": rigs.missing(found).into_iter().map(link).collect::<Vec<_>>(),
+        "missing": presences.iter().filter(|(_, is)| *is == Presence::Missing).map(|(of, _)| link(of)).collect::<Vec<_>>(),
+        "named": presences.iter().map(|(of, is)| json!({
+            "rig": of.rig,
+            "role": of.role,
+            "transport": of.transport.to_toml(),
+            "there": match is {
+                Presence::There => Some(true),
+                Presence::Missing => Some(false),
+                Presence::Embedded | Presence::Remote => None,
+            },
+        })).collect::<Vec<_>>(),
         "notes": rigs.notes,
         "hint": found.is_empty().then_some(NOTHING),
     })

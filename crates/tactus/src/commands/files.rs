@@ -3,39 +3,92 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use tactus_record::Completeness;
+use tactus_record::table::TableFormat;
+use tactus_record::{Completeness, Info};
 use tactus_schema::pb;
 
 use crate::cli::{Common, ExportArgs, RecoverArgs, ReportArgs};
 use crate::commands::run::write_report;
-use crate::exit::Exit;
-use crate::output::print_fields;
+use crate::exit::{Exit, Failure, in_words};
+use crate::output::{duration, print_fields, print_table};
 
 /// The exit status of a run whose service died, as recordings tell it.
 const CRASHED: &str = pb::ExitStatus::Crashed.word();
 
-pub(crate) fn info(common: &Common, file: &Path) -> anyhow::Result<Exit> {
+pub(crate) fn info(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
+    let [file] = files else { return infos(common, files) };
     let info = tactus_record::info(file)?;
     if common.json {
         println!("{}", serde_json::to_string(&info)?);
     } else {
         println!("{info}");
     }
+    Ok(tell_lacks(file, &info))
+}
+
+/// A row for each recording. One that cannot be read does not hide the others.
+fn infos(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
+    let (mut infos, mut unreadable, mut exit) = (Vec::new(), Vec::new(), Exit::Done);
+    for file in files {
+        match tactus_record::info(file) {
+            Ok(info) => {
+                if tell_lacks(file, &info) != Exit::Done && exit == Exit::Done {
+                    exit = Exit::Degraded;
+                }
+                infos.push(info);
+            }
+            Err(error) => {
+                let error = in_words(&error.into());
+                eprintln!("tactus: {error}");
+                unreadable.push(json!({ "path": file, "error": error }));
+                exit = Exit::Failed;
+            }
+        }
+    }
+    if common.json {
+        println!("{}", json!({ "recordings": infos, "unreadable": unreadable }));
+        return Ok(exit);
+    }
+    let rows: Vec<_> = infos.iter().map(row).collect();
+    let header =
+        ["RUN", "EXPERIMENT", "RIG", "STARTED", "DURATION", "STATUS", "PRESSES", "FRAMES", "LOST", "FILE"];
+    print_table(&header, &rows);
+    Ok(exit)
+}
+
+fn row(info: &Info) -> Vec<String> {
+    vec![
+        info.run_id.clone(),
+        info.experiment.clone(),
+        format!("{}{}", info.rig, if info.simulated { " (SIMULATED)" } else { "" }),
+        info.started.clone(),
+        duration(info.duration_s),
+        info.exit_status.unwrap_or("open").to_owned(),
+        info.presses.to_string(),
+        info.frames.to_string(),
+        (info.frames_lost + info.frames_missing).to_string(),
+        info.path.clone(),
+    ]
+}
+
+/// Says what a recording lacks.
+fn tell_lacks(file: &Path, info: &Info) -> Exit {
     let whole = info.completeness == Completeness::Complete && info.exit_status.is_some();
+    let file = file.display();
     if !whole {
         let is_damaged = matches!(info.completeness, Completeness::Damaged(_));
         let what = if is_damaged { "is damaged" } else { "was cut off" };
-        eprintln!("tactus: this recording {what}; `tactus recover {}` repairs it", file.display());
+        eprintln!("tactus: {file} {what}; `tactus recover {file}` repairs it");
     }
     if info.frames_missing > 0 {
-        eprintln!("tactus: {} frames were received and are missing in this recording", info.frames_missing);
+        eprintln!("tactus: {} frames were received and are missing in {file}", info.frames_missing);
     }
-    Ok(if whole && info.frames_missing == 0 { Exit::Done } else { Exit::Degraded })
+    if whole && info.frames_missing == 0 { Exit::Done } else { Exit::Degraded }
 }
 
 pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit> {
-    let out = args.out.clone().unwrap_or_else(|| beside(args.recordings.first(), "table.parquet"));
-    let summary = tactus_record::export(&args.recordings, &out)?;
+    let (out, format) = table_of(args)?;
+    let summary = tactus_record::export_as(&args.recordings, &out, format)?;
     if common.json {
         println!("{}", serde_json::to_string(&summary)?);
     } else {
@@ -52,6 +105,28 @@ pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit>
         ]);
     }
     Ok(if summary.warnings.is_empty() { Exit::Done } else { Exit::Degraded })
+}
+
+/// The table to write, and its format: as asked, else as its name ends.
+fn table_of(args: &ExportArgs) -> anyhow::Result<(PathBuf, TableFormat)> {
+    let asked =
+        args.format.as_deref().and_then(|name| TableFormat::ALL.into_iter().find(|one| one.name() == name));
+    let Some(out) = &args.out else {
+        let format = asked.unwrap_or(TableFormat::Parquet);
+        return Ok((beside(args.recordings.first(), &format!("table.{}", format.name())), format));
+    };
+    let format = asked.or_else(|| TableFormat::of_path(out)).ok_or_else(|| {
+        let is_mcap = out.extension().is_some_and(|extension| extension == "mcap");
+        let why = if is_mcap {
+            "a recording is MCAP already, and a table is not"
+        } else {
+            "the name does not say the format"
+        };
+        let what =
+            format!("--out {}: {why}: end it in .parquet, .csv or .npz, or add --format", out.display());
+        Failure::new(Exit::Usage, what)
+    })?;
+    Ok((out.clone(), format))
 }
 
 pub(crate) fn recover(common: &Common, args: &RecoverArgs) -> anyhow::Result<Exit> {

@@ -2,33 +2,39 @@
 
 use std::sync::Arc;
 
+use anyhow::{Context, bail};
 use serde_json::json;
-use tactus_plan::{Parameter, RigView};
+use tactus_plan::{Arguments, Parameter, RigView, Script};
 use tactus_runner::config;
 use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::script_process::ScriptProcesses;
 use tactus_runner::twin::{self, DryRun};
-use tactus_schema::{Rig, WallTime};
+use tactus_schema::key::Command;
+use tactus_schema::{Rig, WallTime, pb};
 
 use super::run::experiment;
 use crate::cli::{Common, PlanArgs};
-use crate::exit::{Exit, Failure};
+use crate::connection::{self, PATIENCE};
+use crate::exit::{Exit, Failure, at_source};
 use crate::output::{duration, print_fields, print_table};
+use crate::source_line::with_source_line;
 
 /// Default seed, so that repeated plans agree.
 const SEED: u64 = 1;
 
 pub(crate) fn plan(common: &Common, args: &PlanArgs) -> anyhow::Result<Exit> {
     let (script, arguments) = experiment(&args.experiment.experiment, &args.experiment.parameters)?;
-    let rig = match &args.rig_file {
-        Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?.rig,
-        None => Rig::from_toml(SIMULATED_RIG)?,
-    };
+    let (name, source) = (script.name().to_owned(), script.source().to_owned());
+    plan_of(common, args, script, arguments).map_err(|error| at_source(&error, &name, &source))
+}
+
+fn plan_of(common: &Common, args: &PlanArgs, script: Script, arguments: Arguments) -> anyhow::Result<Exit> {
+    let PlannedRig { rig, whose } = PlannedRig::find(common, args)?;
     let parameters =
         script.parameters(&RigView::of(&rig)).map_err(|error| Failure::new(Exit::Usage, error))?;
     let summary = script.doc().lines().next().unwrap_or_default().to_owned();
-    let name = script.name().to_owned();
+    let (name, source) = (script.name().to_owned(), script.source().to_owned());
     let request = RunRequest {
         script,
         arguments,
@@ -43,11 +49,66 @@ pub(crate) fn plan(common: &Common, args: &PlanArgs) -> anyhow::Result<Exit> {
     let values: serde_json::Value = serde_json::from_str(&order.arguments.to_json())?;
     let plan = twin::dry_run(&rig, order, &never)?;
     if common.json {
-        println!("{}", to_json(&name, &rig, &parameters, &values, &plan));
+        let mut told = to_json(&name, &rig, &parameters, &values, &plan);
+        told["rig_of"] = whose.into();
+        println!("{told}");
     } else {
-        print(&name, &summary, &rig, &parameters, &values, &plan);
+        println!("{name}: {summary}\n");
+        print(&rig, &whose, &parameters, &values, &plan);
+        if plan.is_possible() {
+            println!("\n`tactus run {}` does it", args.experiment.experiment);
+        } else {
+            let message = &plan.outcome.message;
+            println!("\n{}", with_source_line(message, &name, &source));
+        }
     }
     Ok(Exit::of_run(plan.outcome.exit_status))
+}
+
+/// The rig that would run the experiment.
+struct PlannedRig {
+    rig: Rig,
+    /// Whose rig it is, for a person.
+    whose: String,
+}
+
+impl PlannedRig {
+    /// As `run` chooses it: the file that was given, else the service's rig, else the embedded one.
+    fn find(common: &Common, args: &PlanArgs) -> anyhow::Result<Self> {
+        if let Some(path) = &args.rig_file {
+            let rig = config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?.rig;
+            return Ok(Self { rig, whose: format!("of {}", path.display()) });
+        }
+        let embedded = |why: &str| {
+            let whose = format!("embedded, {why}");
+            anyhow::Ok(Self { rig: Rig::from_toml(SIMULATED_RIG)?, whose })
+        };
+        if args.embedded {
+            return embedded("as asked");
+        }
+        connection::runtime()?.block_on(async {
+            let Some(client) = connection::find(common).await? else {
+                return embedded(&format!("no service at {}", common.endpoint));
+            };
+            let request = pb::CommandRequest { who: connection::who(), ..Default::default() };
+            let told = connection::ask(&client, Command::Status, &request, PATIENCE).await?;
+            client.close().await?;
+            Self::of_service(&told, &common.endpoint)
+        })
+    }
+
+    /// The service's rig, with the covering that is in place now.
+    fn of_service(told: &pb::CommandReply, endpoint: &str) -> anyhow::Result<Self> {
+        if told.rig_toml.is_empty() {
+            bail!(
+                "the service at {endpoint} does not tell its rig: it is of version {}; give the rig's file with --rig-file",
+                told.version
+            );
+        }
+        let mut rig = Rig::from_toml(&told.rig_toml).context("the rig of the service")?;
+        rig.covering.thickness_mm = told.covering_mm;
+        Ok(Self { rig, whose: format!("of the service at {endpoint}") })
+    }
 }
 
 fn to_json(
@@ -81,15 +142,7 @@ fn to_json(
     })
 }
 
-fn print(
-    name: &str,
-    summary: &str,
-    rig: &Rig,
-    parameters: &[Parameter],
-    values: &serde_json::Value,
-    plan: &DryRun,
-) {
-    println!("{name}: {summary}\n");
+fn print(rig: &Rig, whose: &str, parameters: &[Parameter], values: &serde_json::Value, plan: &DryRun) {
     let rows: Vec<_> = parameters
         .iter()
         .map(|parameter| {
@@ -107,9 +160,9 @@ fn print(
         println!();
     }
     let outcome = &plan.outcome;
-    let result = if plan.is_possible() { "possible".into() } else { format!("REFUSED: {}", outcome.message) };
+    let result = if plan.is_possible() { "possible".into() } else { "REFUSED: see below".into() };
     let mut fields = vec![
-        ("on rig", format!("{} (dry run on its simulated twin)", rig.name)),
+        ("on rig", format!("{} ({whose}; dry run on its simulated twin)", rig.name)),
         ("result", result),
         ("presses", format!("{}, {} dwells", outcome.presses, outcome.dwells)),
         ("duration", duration(outcome.duration_s)),

@@ -8,11 +8,13 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use serde_json::json;
 use tactus_plan::{Arguments, Script};
+use tactus_runner::experiments::{self, ExperimentError};
 use tactus_schema::pb;
 
 use crate::cli::{Common, RunArgs};
+use crate::commands::control::with_message;
 use crate::connection;
-use crate::exit::{Exit, Failure, in_words};
+use crate::exit::{Exit, Failure, at_source, in_words};
 use crate::output::{duration, print_fields, say};
 
 /// How a run ended.
@@ -35,7 +37,7 @@ pub(super) struct RunSummary {
 
 /// What is to be run.
 #[expect(clippy::large_enum_variant, reason = "there is one of it")]
-enum Subject {
+pub(super) enum Subject {
     Experiment {
         script: Script,
         arguments: Arguments,
@@ -46,7 +48,12 @@ enum Subject {
 }
 
 pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
-    let summary = execute(common, args)?;
+    run_subject(common, args, Subject::of(args)?)
+}
+
+/// Runs, writes the report, and says how it ended.
+pub(super) fn run_subject(common: &Common, args: &RunArgs, subject: Subject) -> anyhow::Result<Exit> {
+    let summary = execute_at_source(common, args, subject)?;
     let report = if args.no_report { None } else { make_report(&summary, &args.out) };
     if common.json {
         say(&to_json(&summary, report.as_deref()).to_string());
@@ -58,7 +65,22 @@ pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
 
 /// Runs the experiment, on the service if there is one, else embedded.
 pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<RunSummary> {
-    let subject = Subject::of(args)?;
+    execute_at_source(common, args, Subject::of(args)?)
+}
+
+/// An error in the script is told with its line.
+fn execute_at_source(common: &Common, args: &RunArgs, subject: Subject) -> anyhow::Result<RunSummary> {
+    let script = match &subject {
+        Subject::Experiment { script, .. } => Some((script.name().to_owned(), script.source().to_owned())),
+        Subject::Rest(_) => None,
+    };
+    execute_subject(common, args, subject).map_err(|error| match &script {
+        Some((name, source)) => at_source(&error, name, source),
+        None => error,
+    })
+}
+
+fn execute_subject(common: &Common, args: &RunArgs, subject: Subject) -> anyhow::Result<RunSummary> {
     if args.embedded || args.rig_file.is_some() {
         return embedded::run(common, args, subject, "as asked");
     }
@@ -92,13 +114,23 @@ impl Subject {
 
 /// The script and its parameters from the command line.
 pub(super) fn experiment(name: &str, parameters: &[String]) -> anyhow::Result<(Script, Arguments)> {
-    let script =
-        tactus_runner::experiments::find(name, None).map_err(|error| Failure::new(Exit::Usage, error))?;
+    let script = experiments::find(name, None).map_err(|error| unusable(name, error))?;
     let mut arguments = Arguments::default();
     for parameter in parameters {
         arguments.set(parameter).map_err(|error| Failure::new(Exit::Usage, error))?;
     }
     Ok((script, arguments))
+}
+
+/// Why there is no such script: with its line, if it has an error.
+fn unusable(name: &str, error: ExperimentError) -> anyhow::Error {
+    let is_of_script = matches!(error, ExperimentError::Script(_));
+    let error = Failure::new(Exit::Usage, error).into();
+    let path = Path::new(name);
+    match (path.file_stem(), std::fs::read_to_string(path)) {
+        (Some(stem), Ok(source)) if is_of_script => at_source(&error, &stem.to_string_lossy(), &source),
+        _ => error,
+    }
 }
 
 /// Writes the report of a run: beside the recording of the embedded rig; for a run on a service into the run's folder in `out`,
@@ -173,7 +205,7 @@ fn print(summary: &RunSummary, report: Option<&Path>) {
     let simulated = if summary.simulated { " (SIMULATED)" } else { "" };
     let mut fields = vec![
         ("run", format!("{}{simulated}", summary.run_id)),
-        ("ended", format!("{} {}", summary.exit_status.word(), summary.message).trim_end().to_owned()),
+        ("ended", with_message(summary.exit_status.word(), &summary.message)),
         ("presses", presses_in_words(summary)),
         ("frames", format!("{}, {} lost", summary.frames, summary.frames_lost)),
         ("duration", duration(summary.duration_s)),
@@ -185,7 +217,25 @@ fn print(summary: &RunSummary, report: Option<&Path>) {
     if let Some(report) = report {
         fields.push(("report", report.display().to_string()));
     }
+    if let Some(next) = next_command(summary) {
+        fields.push(("next", next));
+    }
     print_fields(&fields);
+}
+
+/// The command that a person is likely to want after the run.
+fn next_command(summary: &RunSummary) -> Option<String> {
+    let recording = summary.recording.display();
+    match summary.exit_status {
+        pb::ExitStatus::Done | pb::ExitStatus::Degraded => {
+            Some(format!("`tactus export {recording}` writes its table; `tactus runs` lists all runs"))
+        }
+        pb::ExitStatus::Stopped | pb::ExitStatus::Failed | pb::ExitStatus::Crashed => {
+            let embedded = if summary.embedded { " --embedded" } else { "" };
+            Some(format!("`tactus run --continue {}{embedded}` goes on with it", summary.run_id))
+        }
+        pb::ExitStatus::Unspecified | pb::ExitStatus::Aborted | pb::ExitStatus::Refused => None,
+    }
 }
 
 fn presses_in_words(summary: &RunSummary) -> String {

@@ -5,14 +5,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde_json::{Value, json};
+use tactus_bus::BusError;
 use tactus_runner::config;
 use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_runner::stage_check::{self, CheckedMove, STEP_MM, StageCheck};
-use tactus_schema::Rig;
+use tactus_schema::key::Command;
 use tactus_schema::rig::{StageLink, Transport};
+use tactus_schema::{Rig, pb};
 
 use crate::cli::{Common, StageCheckArgs};
-use crate::connection;
+use crate::connection::{self, PATIENCE};
 use crate::exit::{Exit, Failure};
 use crate::output::{print_fields, print_table, say};
 
@@ -53,20 +55,35 @@ fn rig_file(common: &Common, args: &StageCheckArgs) -> anyhow::Result<Option<Pat
 
 /// Fails if a running service holds the stage.
 fn check_free(common: &Common, rig: &Rig, stage: &StageLink) -> anyhow::Result<()> {
-    let of_the_rig = Common { rig: Some(rig.name.clone()), ..common.clone() };
-    let client = connection::runtime()?.block_on(connection::find(&of_the_rig))?;
-    // A service that is not ready yet lists no rig.
-    let Some(served) = client.map(|client| client.rigs()) else { return Ok(()) };
-    if served.is_empty() || served.contains(&rig.name) {
-        let what = format!(
-            "stage ({}): busy: the service at {} holds it; stop the service first (`systemctl stop tactusd`), or \
-             ask it with `tactus status`",
-            in_words(stage),
-            common.endpoint
-        );
-        return Err(Failure::new(Exit::Failed, what).into());
+    if !connection::runtime()?.block_on(is_held(common, rig, stage))? {
+        return Ok(());
     }
-    Ok(())
+    let what = format!(
+        "stage ({}): busy: the service of rig {:?} at {} holds it; stop the service first (`systemctl stop tactusd`), or \
+         ask it with `tactus status`",
+        in_words(stage),
+        rig.name,
+        common.endpoint
+    );
+    Err(Failure::new(Exit::Failed, what).into())
+}
+
+/// True if the rig's own service runs at the endpoint, unless it says that its stage is at another place. That of another rig is
+/// no obstacle: if it holds the port nevertheless, opening the port fails.
+async fn is_held(common: &Common, rig: &Rig, stage: &StageLink) -> anyhow::Result<bool> {
+    let endpoint = connection::endpoint(common)?;
+    match tactus_bus::rigs_at(&endpoint, &common.credentials()).await {
+        Ok(served) if served.contains(&rig.name) => {}
+        Ok(_) | Err(BusError::NoService { .. }) => return Ok(false),
+        Err(error) => return Err(error.into()),
+    }
+    let of_the_rig = Common { rig: Some(rig.name.clone()), ..common.clone() };
+    let Some(client) = connection::look(&of_the_rig).await? else { return Ok(false) };
+    let request = pb::CommandRequest { who: connection::who(), ..Default::default() };
+    let told = connection::ask(&client, Command::Status, &request, PATIENCE).await;
+    client.close().await?;
+    let theirs = told.ok().and_then(|told| Rig::from_toml(&told.rig_toml).ok()?.service);
+    Ok(theirs.is_none_or(|theirs| theirs.stage.transport == stage.transport))
 }
 
 /// Asks before any hardware moves, unless `--yes` was given.

@@ -56,8 +56,9 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     let quantities = quantities::quantities(&calibrated, truth.as_ref(), images.as_ref())?;
     figures.extend(images.into_iter().flat_map(|images| images.figures));
     let mut warnings: Vec<String> = taken.iter().filter_map(|taken| taken.degraded.clone()).collect();
+    let is_lossy = calibrated.is_lossy || !warnings.is_empty();
     warnings.extend(calibrated.notes.iter().chain(&calibrated.calibration.warnings).cloned());
-    let findings = Findings { quantities, missing, warnings };
+    let findings = Findings { quantities, missing, warnings, is_lossy };
     write_report(args, &calibrated, &taken, &findings, &figures)?;
     finish(common, args, &calibrated, &findings, start)
 }
@@ -69,6 +70,8 @@ struct Findings {
     missing: Vec<String>,
     /// Reservations about the numbers.
     warnings: Vec<String>,
+    /// True if something of the runs was lost.
+    is_lossy: bool,
 }
 
 fn write_report(
@@ -104,7 +107,7 @@ fn finish(
     common: &Common,
     args: &StudyArgs,
     calibrated: &Calibrated,
-    Findings { quantities, missing, warnings }: &Findings,
+    Findings { quantities, missing, warnings, is_lossy }: &Findings,
     start: Instant,
 ) -> anyhow::Result<Exit> {
     let report = std::path::absolute(args.out.join("report.html"))?;
@@ -139,5 +142,5 @@ fn finish(
         }
         say(&format!("{}\ndone in {}", report.display(), duration(start.elapsed().as_secs_f64())));
     }
-    Ok(if missing.is_empty() && warnings.is_empty() { Exit::Done } else { Exit::Degraded })
+    Ok(if missing.is_empty() && !is_lossy { Exit::Done } else { Exit::Degraded })
 }
