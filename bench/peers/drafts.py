@@ -7,7 +7,7 @@ covariates. A draft of theirs is where it acts and on what it depends most, foun
   Julia that no package index holds. Three targets: the mean residual of a frame (counts are added), its residual as a share
   of the signal (the signal changes), and the residual of single readings. The covariate is the input whose values matter most
   to the best expression when they are shuffled.
-- Sparse regression: PySINDy's STLSQ on 1 and the own signal, times each covariate, its square, and its cube. The covariate is
+- Sparse regression: PySINDy's STLSQ on 1 and the own signal, times each covariate and its square. The covariate is
   that of the term which explains most.
 
 Held-out presses choose between targets and between thresholds. There is a draft if it predicts them significantly. What it closes
@@ -21,12 +21,12 @@ from scipy.stats import ttest_1samp
 
 LEVEL = 0.005
 THRESHOLDS = (0.003, 0.01, 0.03, 0.1, 0.3)
-READINGS = 6_000
+READINGS = 20_000
+SINGLE = 4_000
 LAG = 8
 LOUD = 0.05
 
-# From tuning sets: larger populations found no more right drafts there.
-SEARCH = dict(population_size=500, generations=60, max_evaluations=400_000, max_length=25, n_threads=1, random_state=1)
+SEARCH = dict(population_size=300, generations=40, max_evaluations=150_000, max_length=25, n_threads=1, random_state=1)
 SYMBOLS = "add,sub,mul,div,exp,log,sin,sqrt,square,constant,variable"
 
 
@@ -48,30 +48,32 @@ def symbolic(data):
 
 def sparse(data):
     """The draft of sparse regression; None if none predicts held-out presses."""
-    own = data.base
-    columns = {}
+    own, elements = data.base, data.base.shape[1]
+    fitted = np.flatnonzero(np.repeat(~data.is_held, elements))
+    some = np.random.default_rng(1).choice(fitted, min(READINGS, len(fitted)), replace=False)
+    held = np.flatnonzero(np.repeat(data.is_held, elements))
+    keys, columns = [], []
     for name, values in {**of_frames(data), **of_readings(data)}.items():
         values = np.broadcast_to(values[:, None] if values.ndim == 1 else values, own.shape)
         values = (values - values.mean()) / max(values.std(), 1e-12)
-        for power in (1, 2, 3):
-            columns["readout", name, power] = values**power
-            columns["covering", name, power] = own * values**power
-    keys = list(columns)
-    terms = np.stack([columns[key].ravel() for key in keys], axis=1)
-    sizes = np.maximum(np.sqrt((terms * terms).mean(axis=0)), 1e-12)
-    terms /= sizes
-    fitted = np.repeat(~data.is_held, own.shape[1])
-    some = np.flatnonzero(fitted)[:: max(1, int(fitted.sum()) // 60_000)]
-    target = data.residual.ravel()
+        for stage, carrier in (("readout", 1.0), ("covering", own)):
+            for power in (1, 2):
+                term = (carrier * values**power).ravel()
+                keys.append((stage, name))
+                columns.append(np.r_[term[some], term[held]] / max(term.std(), 1e-12))
+    terms = np.stack(columns, axis=1)
+    at_some, at_held = terms[: len(some)], terms[len(some) :]
+    target = data.residual.ravel()[some]
     drafts = []
     for threshold in THRESHOLDS:
         optimizer = pysindy.STLSQ(threshold=threshold * data.noise, alpha=1e-6)
-        optimizer.fit(terms[some], target[some, None])
+        optimizer.fit(at_some, target[:, None])
         weights = optimizer.coef_[0]
         if not weights.any():
             continue
-        stage, covariate, _ = keys[int(np.argmax(np.abs(weights)))]
-        predicted = (terms @ weights).reshape(own.shape)
+        stage, covariate = keys[int(np.argmax(np.abs(weights)))]
+        predicted = np.zeros_like(data.residual)
+        predicted[data.is_held] = (at_held @ weights).reshape(-1, elements)
         drafts.append((gains(data, predicted), stage, covariate, predicted))
     return told(data, drafts)
 
@@ -92,7 +94,7 @@ def of_single(data, readings):
     shape = data.base.shape
     values = np.stack([readings[name].ravel() for name in names], axis=1)
     fitted = np.flatnonzero(np.repeat(~data.is_held, shape[1]))
-    some = np.random.default_rng(1).choice(fitted, min(READINGS, len(fitted)), replace=False)
+    some = np.random.default_rng(1).choice(fitted, min(SINGLE, len(fitted)), replace=False)
     model = SymbolicRegressor(allowed_symbols=SYMBOLS, **SEARCH)
     target = data.residual.ravel()
     model.fit(values[some], target[some])

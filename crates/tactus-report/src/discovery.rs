@@ -159,11 +159,11 @@ fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
         || "unknown".to_owned(),
         |part| {
             let upper = if part.upper_noise.is_finite() {
-                format!("at most {}", digits(part.upper_noise, 3))
+                format!("&#8804; {}", digits(part.upper_noise, 3))
             } else {
                 "no bound".to_owned()
             };
-            format!("{} <small>{upper} (95 %)</small>", digits(part.rms_noise, 3))
+            format!("{} <small>{upper}</small>", digits(part.rms_noise, 3))
         },
     );
     let split = &found.split;
@@ -171,7 +171,7 @@ fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
         ("noise / counts", noise.map_or_else(|| "unknown".into(), |rms| digits(rms, 3))),
         ("residual before / counts", level(found.base.heldout_rms_counts)),
         ("residual after / counts", level(found.final_.level.heldout_rms_counts)),
-        ("structured after / noise", structured),
+        ("structured / noise, 95 % bound", structured),
         ("gap closed", found.final_.shrink.map_or_else(|| "\u{2013}".into(), words::percent)),
         (
             "presses fitted",

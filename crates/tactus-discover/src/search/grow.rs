@@ -238,11 +238,11 @@ impl Search<'_> {
         let p_value = self.tested(&pass, grown, 2 * NAMES_MAX + 1).p_value;
         let (evidence, unit) = (pass.evidence(), self.unit(0.0, grown));
         let gains = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), f64::NEG_INFINITY);
-        // Where nothing is gained, the odds are those before the data.
-        let nothing = 1.0 / (1.0 + ODDS_AGAINST);
         let probability = |name: &str| {
             let gain = gains.iter().find(|(one, _)| pass.class_of(*one) == name);
-            gain.map_or(nothing, |(_, gain)| 1.0 / (1.0 + (-gain.ln_odds / unit).exp()))
+            // What the data say counts for one part in `unit`; the odds before the data stay.
+            let evidence = gain.map_or(0.0, |(_, gain)| (gain.ln_odds + ODDS_AGAINST.ln()).max(0.0));
+            1.0 / (1.0 + ODDS_AGAINST * (-evidence / unit).exp())
         };
         let names = self.candidates.iter().map(|candidate| candidate.definition.name);
         Ok(Left { p_value, probabilities: names.map(|name| (name, probability(name))).collect() })

@@ -25,17 +25,6 @@ pub(super) fn sections(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>)
 }
 
 fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
-    let mut table = Table::new(&[
-        Column::Name("on held-out presses"),
-        Column::Number("residual / counts rms"),
-        Column::Number("residual / noise"),
-        Column::Number("variance / counts\u{b2}"),
-        Column::Number("variance / noise\u{b2}"),
-        Column::Number("gap / counts rms"),
-        Column::Number("gap / noise"),
-        Column::Number("structured / noise"),
-        Column::Number("at most (95 %)"),
-    ]);
     let noise = found.floor.rms_counts();
     let or_dash = |value: Option<f64>| {
         value.map_or_else(
@@ -43,23 +32,29 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
             |value| if value.is_finite() { digits(value, 3) } else { "unknown".into() },
         )
     };
-    let mut row = |name: &str, level: Level| {
+    let gap = |level: Level| {
         let rms = level.heldout_rms_counts;
-        let gap = noise.map(|noise| (rms * rms - noise * noise).max(0.0).sqrt());
-        table.row([
-            name.to_owned(),
-            digits(rms, 3),
-            or_dash(noise.map(|noise| rms / noise)),
-            digits(rms * rms, 3),
-            or_dash(level.heldout_chi2),
-            or_dash(gap),
-            or_dash(gap.zip(noise).map(|(gap, noise)| gap / noise)),
-            or_dash(level.structured.map(|part| part.rms_noise)),
-            or_dash(level.structured.map(|part| part.upper_noise)),
-        ]);
+        noise.map(|noise| (rms * rms - noise * noise).max(0.0).sqrt())
     };
-    row("base model, recalibrated", found.base);
-    row("grown model", found.final_.level);
+    let in_noise = |counts: Option<f64>| counts.zip(noise).map(|(counts, noise)| counts / noise);
+    let rows: [(&str, &dyn Fn(Level) -> Option<f64>); 8] = [
+        ("residual / counts rms", &|level| Some(level.heldout_rms_counts)),
+        ("residual / noise", &|level| in_noise(Some(level.heldout_rms_counts))),
+        ("its variance / counts\u{b2}", &|level| Some(level.heldout_rms_counts.powi(2))),
+        ("its variance / noise\u{b2}", &|level| level.heldout_chi2),
+        ("gap / counts rms", &gap),
+        ("gap / noise", &|level| in_noise(gap(level))),
+        ("structured / noise", &|level| level.structured.map(|part| part.rms_noise)),
+        ("structured at most (95 %) / noise", &|level| level.structured.map(|part| part.upper_noise)),
+    ];
+    let mut table = Table::new(&[
+        Column::Name("on held-out presses"),
+        Column::Number("base model, recalibrated"),
+        Column::Number("grown model"),
+    ]);
+    for (name, of) in rows {
+        table.row([name.to_owned(), or_dash(of(found.base)), or_dash(of(found.final_.level))]);
+    }
     writeln!(
         f,
         "<section>\n<h2>The gap before and after</h2>\n<figure>\n{}\n<figcaption>Root mean square of the residual on held-out presses, in \

@@ -21,6 +21,16 @@ fn tentative(found: &Discovery) -> Option<String> {
     (!found.tentative.is_empty()).then(of)
 }
 
+/// What was drafted of what no known effect explains.
+fn drafted(found: &Discovery) -> Option<String> {
+    let Some(Ok(one)) = &found.draft else { return None };
+    let closes = one.closed.map_or_else(
+        || "nothing is left on held-out presses".to_owned(),
+        |of_left| format!("it closes {} of what is left", closed(of_left)),
+    );
+    Some(format!("It is drafted as {}: {}; {closes}.", one.draft.name, one.draft.sentence))
+}
+
 /// The verdict in a sentence or two, with its numbers.
 pub fn in_words(found: &Discovery) -> String {
     let before = digits(found.base.heldout_rms_counts, 3);
@@ -70,7 +80,13 @@ pub fn in_words(found: &Discovery) -> String {
             nearest(found)
         ),
     };
-    [verdict].into_iter().chain(tentative(found)).chain(faulty::in_words(found)).collect::<Vec<_>>().join(" ")
+    [verdict]
+        .into_iter()
+        .chain(drafted(found))
+        .chain(tentative(found))
+        .chain(faulty::in_words(found))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// What is structured in the grown model's residual.

@@ -6,7 +6,7 @@ use super::{Axis, Panel, Series, axis::AxisScale, series::Mark};
 use crate::markup::Text;
 
 /// Margin left of the axes for tick labels and the title.
-const LEFT_PX: f64 = 70.0;
+const LEFT_PX: f64 = 78.0;
 /// Margin below the axes.
 const BELOW_PX: f64 = 44.0;
 /// Margin right of the axes for the last tick label.
@@ -157,7 +157,7 @@ impl PlotArea {
         let middle = f64::midpoint(self.top, self.bottom);
         write!(
             f,
-            r#"<text class="x name" transform="translate(14 {middle}) rotate(-90)">{}</text>"#,
+            r#"<text class="x name" transform="translate(12 {middle}) rotate(-90)">{}</text>"#,
             Text(figure.y.title())
         )
     }
