@@ -392,9 +392,18 @@ fn methods(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
     if ablations.len() < 2 {
         return Ok(());
     }
+    writeln!(f, "\n## Other methods on the same sets")?;
+    if ablations.iter().any(|method| method.exact.of > 0) {
+        methods_that_name(f, ablations)?;
+    }
+    methods_that_draft(f, ablations)
+}
+
+/// Names by other methods on the same sets.
+fn methods_that_name(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
     writeln!(
         f,
-        "\n## Other methods on the same sets\n\n| method | false alarms | named exactly | in the reported set | a wrong name | both of two named | outside: unexplained | outside: any effect named | shrink: median, fifth percentile (sets) | the same on presses deeper than any fitted | s for each set |\n|---|---|---|---|---|---|---|---|---|---|---|"
+        "\n| method | false alarms | named exactly | in the reported set | a wrong name | both of two named | outside: unexplained | outside: any effect named | shrink: median, fifth percentile (sets) | the same on presses deeper than any fitted | s for each set |\n|---|---|---|---|---|---|---|---|---|---|---|"
     )?;
     for method in ablations {
         writeln!(
@@ -420,7 +429,7 @@ fn methods(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
             method.seconds.unwrap_or(f64::NAN),
         )?;
     }
-    methods_that_draft(f, ablations)
+    Ok(())
 }
 
 /// Drafts by other methods on the same sets.
