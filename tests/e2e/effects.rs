@@ -47,6 +47,15 @@ fn the_labs_drafts_are_listed_shown_renamed_and_retired() {
     }
     assert!(effects(&["show", "softening"]).out.contains("shown by"));
 
+    let said = effects(&["show", "draft-1", "--figure", "curve.svg"]);
+    assert!(said.code == Some(2) && said.err.contains("no curve to draw"), "a constant has none: {said:?}");
+    let slope = GROUNDED.replace("slope = 0.0", "slope = 2.0").replace("draft-1", "sloping");
+    fs::write(drafts.join("sloping.toml"), slope).unwrap();
+    assert_eq!(effects(&["show", "sloping", "--figure", "curve.svg"]).code, Some(0));
+    let drawn = fs::read_to_string(folder.path().join("curve.svg")).unwrap();
+    assert!(drawn.contains("depth / mm") && drawn.contains("counts"), "{drawn}");
+    fs::remove_file(drafts.join("sloping.toml")).unwrap();
+
     for (to, want) in [("hardening", "of the library"), ("Draft 2", "small letters")] {
         let said = effects(&["rename", "draft-1", to]);
         assert_eq!(said.code, Some(2), "{said:?}");

@@ -32,7 +32,9 @@ use crate::{
 
 pub use active::{ActiveRun, AmbiguousEffect, command};
 pub use draft::status as draft_status;
-pub use figures::{drafted_curve, drafted_weights, element_maps, free_curve, residual_against, staircase};
+pub use figures::{
+    draft_curve, draft_picture, draft_weights, element_maps, free_curve, residual_against, staircase,
+};
 pub use json::discovery_json;
 pub use next::{Proposal, not_proposed, nothing_open, open, proposals};
 pub use words::{closed, in_words};

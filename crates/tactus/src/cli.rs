@@ -155,6 +155,9 @@ pub(crate) enum EffectsCommand {
     Show {
         /// Its name.
         name: String,
+        /// Draw the curve of a draft into this SVG file.
+        #[arg(long, value_name = "FILE")]
+        figure: Option<PathBuf>,
     },
     /// Put a draft into the library under its name: every discovery tries it from then on.
     Add {

@@ -8,7 +8,7 @@ use tactus_schema::draft::{DraftStatus, stage_name};
 
 use super::{
     DiscoveryReport,
-    figures::{drafted_curve, drafted_weights},
+    figures::{draft_curve, draft_weights},
     words,
 };
 use crate::{
@@ -45,7 +45,7 @@ fn drafted(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>, one: &Draft
         Text(&draft.sentence),
         Text(&draft.name),
     )?;
-    if let Some(curve) = drafted_curve(one) {
+    if let Some(curve) = draft_curve(draft, &one.knots) {
         let caption = match (&draft.law, one.knots.is_empty()) {
             (Law::Table { .. }, false) => "fitted knots with standard errors",
             (_, false) => "fitted knots with standard errors, and the law that passes through them",
@@ -59,7 +59,7 @@ fn drafted(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>, one: &Draft
             "<figure>\n{curve}\n<figcaption>The draft\u{2019}s curve: {caption}.</figcaption>\n</figure>"
         )?;
     }
-    if let Some(weights) = drafted_weights(report.array, draft) {
+    if let Some(weights) = draft_weights(report.array, draft) {
         writeln!(f, "<figure>\n{weights}\n<figcaption>Its weight for each element.</figcaption>\n</figure>")?;
     }
     let mut table = Table::new(&[Column::Name("what"), Column::Name("value")]);

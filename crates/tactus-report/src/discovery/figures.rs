@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_discover::{Curve, Discovery, DraftedEffect, ElementGap, FittedCurve, Point, Stair};
+use tactus_discover::{Curve, Discovery, ElementGap, FittedCurve, Point, Stair};
 use tactus_model::Array;
 use tactus_model::effect::{Draft, Law};
 
@@ -83,10 +83,9 @@ pub fn free_curve(effect: &str, curve: &FittedCurve) -> Figure {
         .with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label(label))
 }
 
-/// The curve of a draft: its knots with their standard errors, and the law that passes through them; of two covariates a line for each knot
+/// The curve of a draft: the law, with the fitted knots and their standard errors where they are given; of two covariates a line for each knot
 /// of the second one. `None` of a constant.
-pub fn drafted_curve(found: &DraftedEffect) -> Option<Figure> {
-    let draft = &found.draft;
+pub fn draft_curve(draft: &Draft, knots: &[[f64; 3]]) -> Option<Figure> {
     let (covariate, [from, to]) = (*draft.covariates.first()?, *draft.ranges.first()?);
     let to = match draft.law {
         Law::Linear { slope: 0.0, .. } => return None,
@@ -120,9 +119,9 @@ pub fn drafted_curve(found: &DraftedEffect) -> Option<Figure> {
         });
         return Some(lines.fold(figure, Figure::with));
     }
-    let known = || found.knots.iter().filter(|[.., error]| error.is_finite());
+    let known = || knots.iter().filter(|[.., error]| error.is_finite());
     let bars = known().map(|[at, value, error]| [*at, value - error, value + error]);
-    let dots: Vec<[f64; 2]> = found.knots.iter().map(|[at, value, _]| [*at, *value]).collect();
+    let dots: Vec<[f64; 2]> = knots.iter().map(|[at, value, _]| [*at, *value]).collect();
     let figure = figure.with(line(&[]).ink(Ink::Muted).label(draft.law.name()));
     if dots.is_empty() {
         return Some(figure);
@@ -131,8 +130,15 @@ pub fn drafted_curve(found: &DraftedEffect) -> Option<Figure> {
     Some(figure.with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label("knots")))
 }
 
+/// The curve of a draft as a picture of its own; `None` of a constant.
+pub fn draft_picture(draft: &Draft) -> Option<Sheet> {
+    let mut sheet = Sheet::new(format!("Curve of {}", draft.name), DRAFT_PX);
+    sheet.put([0.0, 0.0], &draft_curve(draft, &[])?);
+    Some(sheet)
+}
+
 /// The weight that a draft has for each element; `None` if it acts on all alike.
-pub fn drafted_weights(array: &Array, draft: &Draft) -> Option<Sheet> {
+pub fn draft_weights(array: &Array, draft: &Draft) -> Option<Sheet> {
     let (rows, cols) = (array.rows(), array.cols());
     #[expect(clippy::cast_possible_truncation, reason = "a colour needs no more digits")]
     let weights: Vec<f32> = draft.weights.as_ref()?.iter().map(|weight| *weight as f32).collect();

@@ -1,8 +1,11 @@
 //! `effects`: lists the effects of the library and the lab's own; shows, adds, renames and retires those of the lab.
 
+use std::path::Path;
+
 use anyhow::Context;
 use serde_json::{Value, json};
 use tactus_model::effect::{Definition, Draft, Law, REGISTRY};
+use tactus_report::discovery::draft_picture;
 use tactus_schema::DraftFile;
 use tactus_schema::draft::{DraftStatus, stage_name};
 
@@ -15,7 +18,12 @@ pub(crate) fn effects(common: &Common, args: &EffectsArgs) -> anyhow::Result<Exi
     let held = args.library.read()?;
     match &args.command {
         None | Some(EffectsCommand::List) => list(common, &held),
-        Some(EffectsCommand::Show { name }) => show(common, &held, name)?,
+        Some(EffectsCommand::Show { name, figure }) => {
+            show(common, &held, name)?;
+            if let Some(path) = figure {
+                draw(&held, name, path)?;
+            }
+        }
         Some(EffectsCommand::Add { file }) => {
             let added = args.library.add(file)?;
             let name = &added.draft.draft.name;
@@ -76,6 +84,19 @@ fn show(common: &Common, held: &[Held], name: &str) -> anyhow::Result<()> {
         ("shown by", known.shown_by.join(", ")),
     ]);
     Ok(())
+}
+
+/// Draws the curve of a draft.
+fn draw(held: &[Held], name: &str, path: &Path) -> anyhow::Result<()> {
+    let draft = held.iter().find(|one| one.draft.draft.name == name);
+    let picture = draft.and_then(|one| draft_picture(&one.draft.draft));
+    let picture = picture.ok_or_else(|| {
+        Failure::new(
+            Exit::Usage,
+            format!("{name} has no curve to draw: only drafts that depend on something have"),
+        )
+    })?;
+    std::fs::write(path, picture.to_string()).with_context(|| format!("{} cannot be written", path.display()))
 }
 
 fn show_draft(one: &Held) {
