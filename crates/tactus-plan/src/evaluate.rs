@@ -123,7 +123,7 @@ impl<'e> BeforeStmtFuncDyn<'e> for BeforeStatement {
 fn script_error(error: &Error, eval: &Evaluator<'_, '_, '_>, context: &EvaluationContext) -> ScriptError {
     let script = context.job.script.name().to_owned();
     let line = error.span().map_or_else(|| context.job.watch.line().max(1), sandbox::line);
-    let column = error.span().map(sandbox::column);
+    let column = error.span().and_then(sandbox::column);
     let at = Location { script: script.clone(), line, column };
     let call_stack = shortened(error.to_string());
     match halt(error, eval, context) {

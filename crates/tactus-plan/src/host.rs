@@ -1,6 +1,7 @@
 //! The interface between a script and the host that performs its steps.
 
 use std::fmt;
+use std::num::NonZeroU32;
 
 use serde::{Deserialize, Serialize};
 
@@ -35,7 +36,7 @@ pub struct Location {
     /// Line, from 1.
     pub line: u32,
     /// Column in characters, from 1, where it is known.
-    pub column: Option<u32>,
+    pub column: Option<NonZeroU32>,
 }
 
 impl fmt::Display for Location {

@@ -12,6 +12,8 @@ mod nesting;
 mod operators;
 mod text;
 
+use std::num::NonZeroU32;
+
 use starlark::codemap::FileSpan;
 use starlark::syntax::{AstModule, Dialect};
 
@@ -35,7 +37,7 @@ pub(crate) fn parse(name: &str, source: &str) -> Result<AstModule, ScriptError> 
     let mut ast =
         AstModule::parse(&format!("{name}.star"), source.to_owned(), &dialect()).map_err(|error| {
             let problem = error.without_diagnostic().to_string();
-            let (line, column) = error.span().map_or((1, None), |span| (line(span), Some(column(span))));
+            let (line, column) = error.span().map_or((1, None), |span| (line(span), column(span)));
             let problem = problem.trim_start_matches("Parse error: ").to_owned();
             ScriptError::Syntax { at: at(line, column), problem }
         })?;
@@ -50,8 +52,8 @@ pub(crate) fn line(span: &FileSpan) -> u32 {
 }
 
 /// First column of a span, from 1.
-pub(crate) fn column(span: &FileSpan) -> u32 {
-    u32::try_from(span.resolve_span().begin.column).unwrap_or(u32::MAX).saturating_add(1)
+pub(crate) fn column(span: &FileSpan) -> Option<NonZeroU32> {
+    NonZeroU32::new(u32::try_from(span.resolve_span().begin.column).ok()?.saturating_add(1))
 }
 
 fn dialect() -> Dialect {

@@ -13,7 +13,7 @@ fn syntax_errors_tell_the_line() {
     for (source, wanted) in [
         ("x = 1\ny = (\n", "s.star:"),
         ("x = 1\nwhile True:\n    pass\n", "s.star:2:1: cannot use reserved keyword `while`"),
-        ("load('a.star', 'b')\n", "s.star:1: `load` is not allowed"),
+        ("load('a.star', 'b')\n", "s.star:1:1: `load` is not allowed"),
         ("import os\n", "s.star:1:1: cannot use reserved keyword `import`"),
         ("x = 2 ** 3\n", "s.star:1:7: unexpected symbol '**'"),
         ("x = f'{y}'\n", "s.star:1:5: "),

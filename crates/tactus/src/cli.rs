@@ -90,7 +90,7 @@ enum CliCommand {
     /// Inspect recordings.
     #[command(subcommand)]
     Record(RecordCommand),
-    /// Write the measurement table of recordings: Parquet, CSV or NumPy arrays.
+    /// Write the measurement table of recordings as .parquet, .csv or .npz.
     Export(ExportArgs),
     /// Repair a recording that was cut off or is damaged.
     Recover(RecoverArgs),

@@ -164,22 +164,16 @@ impl Sequence {
                 lost + ((by_host - lost) / wrap as f64).round().max(0.0) * wrap as f64
             }
             (GapCause::Reconnected | GapCause::ClockJumped, _) => by_host,
-            (GapCause::Link | GapCause::HostTooSlow, _) => match periods_by(self.tick) {
-                Some(periods) => periods.round() - 1.0,
-                None => {
-                    let by_host = last.lateness.by_host + periods - 1.0 - dropped;
-                    let by_clock = periods_by(self.coarse_tick)
-                        .map(|periods| last.lateness.by_clock + periods - 1.0 - dropped);
-                    let late = by_clock.map_or(by_host, |by_clock| by_host.min(by_clock));
-                    let (lost, lasts) = self.missing_by_arrivals(last.lateness.lasts, late, arrival);
-                    lateness = Lateness {
-                        by_host: settled(by_host - lost),
-                        by_clock: settled(by_clock.unwrap_or_default() - lost),
-                        lasts,
-                    };
+            (GapCause::Link | GapCause::HostTooSlow, _) => {
+                if let Some(periods) = periods_by(self.tick) {
+                    periods.round() - 1.0
+                } else {
+                    let by_clock = periods_by(self.coarse_tick);
+                    let lost;
+                    (lost, lateness) = self.late(last.lateness, periods, by_clock, arrival);
                     lost + dropped
                 }
-            },
+            }
         };
         #[expect(
             clippy::cast_possible_truncation,
@@ -188,6 +182,24 @@ impl Sequence {
         )]
         let missing = missing.max(dropped) as u32;
         (missing, lateness)
+    }
+
+    /// What is missing by the periods that passed since the last frame by the host's and the device's clock, and how late the frame is
+    /// then.
+    fn late(
+        &self,
+        last: Lateness,
+        by_host: f64,
+        by_clock: Option<f64>,
+        arrival: &ReceivedFrame,
+    ) -> (f64, Lateness) {
+        let late = |last: f64, periods: f64| last + periods - 1.0 - arrival.dropped as f64;
+        let by_host = late(last.by_host, by_host);
+        let by_clock = by_clock.map(|periods| late(last.by_clock, periods));
+        let both = by_clock.map_or(by_host, |by_clock| by_host.min(by_clock));
+        let (lost, lasts) = self.missing_by_arrivals(last.lasts, both, arrival);
+        let by_clock = settled(by_clock.unwrap_or_default() - lost);
+        (lost, Lateness { by_host: settled(by_host - lost), by_clock, lasts })
     }
 
     /// Missing frames by times of arrival, which a coarse clock of the device may confirm. A late frame may follow lost frames, or may

@@ -338,7 +338,10 @@ fn a_table_is_text_or_arrays_too() {
         let count = |element: usize| line[10 + element].parse::<f32>().unwrap();
         assert_eq!((line[0], line[2], line[9]), (row.run, row.phase.name(), ""));
         assert_eq!((line[3].parse(), line[6].parse()), (Ok(row.t_ns), Ok(row.position_mm[2])));
-        assert_eq!([count(0), count(47)], [row.counts[0], row.counts[47]]);
+        assert_eq!(
+            [count(0), count(47)].map(f32::to_bits),
+            [row.counts[0], row.counts[47]].map(f32::to_bits)
+        );
     }
     let beside = fs::read_to_string(dir.path().join("table.metadata.json")).unwrap();
     let beside: serde_json::Value = serde_json::from_str(&beside).unwrap();

@@ -16,7 +16,7 @@ use crate::output::{duration, print_fields, print_table};
 const CRASHED: &str = pb::ExitStatus::Crashed.word();
 
 pub(crate) fn info(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
-    let [file] = files else { return infos(common, files) };
+    let [file] = files else { return Ok(infos(common, files)) };
     let info = tactus_record::info(file)?;
     if common.json {
         println!("{}", serde_json::to_string(&info)?);
@@ -27,7 +27,7 @@ pub(crate) fn info(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
 }
 
 /// A row for each recording. One that cannot be read does not hide the others.
-fn infos(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
+fn infos(common: &Common, files: &[PathBuf]) -> Exit {
     let (mut infos, mut unreadable, mut exit) = (Vec::new(), Vec::new(), Exit::Done);
     for file in files {
         match tactus_record::info(file) {
@@ -47,13 +47,13 @@ fn infos(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
     }
     if common.json {
         println!("{}", json!({ "recordings": infos, "unreadable": unreadable }));
-        return Ok(exit);
+        return exit;
     }
     let rows: Vec<_> = infos.iter().map(row).collect();
     let header =
         ["RUN", "EXPERIMENT", "RIG", "STARTED", "DURATION", "STATUS", "PRESSES", "FRAMES", "LOST", "FILE"];
     print_table(&header, &rows);
-    Ok(exit)
+    exit
 }
 
 fn row(info: &Info) -> Vec<String> {

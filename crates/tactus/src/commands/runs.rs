@@ -41,12 +41,12 @@ pub(crate) fn runs(common: &Common, args: &RunsArgs) -> anyhow::Result<Exit> {
                     notes.tags.dedup();
                 }
             })?;
-            told(common, &ListedRun { notes, ..found })
+            Ok(told(common, &ListedRun { notes, ..found }))
         }
         Some(RunsCommand::Note { run, text }) => {
             let found = find(folder, run)?;
             let notes = notes::change(&found.entry.path, |notes| notes.note.clone_from(text))?;
-            told(common, &ListedRun { notes, ..found })
+            Ok(told(common, &ListedRun { notes, ..found }))
         }
         Some(RunsCommand::Compare { ids }) => {
             let found = ids.iter().map(|run| find(folder, run)).collect::<anyhow::Result<Vec<_>>>()?;
@@ -91,7 +91,7 @@ fn row(ListedRun { entry, notes }: &ListedRun) -> Vec<String> {
     ]
 }
 
-fn told(common: &Common, run: &ListedRun) -> anyhow::Result<Exit> {
+fn told(common: &Common, run: &ListedRun) -> Exit {
     if common.json {
         say(&run.to_json().to_string());
     } else {
@@ -102,7 +102,7 @@ fn told(common: &Common, run: &ListedRun) -> anyhow::Result<Exit> {
             ("file", notes::beside(&run.entry.path).display().to_string()),
         ]);
     }
-    Ok(Exit::Done)
+    Exit::Done
 }
 
 impl ListedRun {

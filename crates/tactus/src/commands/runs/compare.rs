@@ -1,7 +1,7 @@
 //! In what runs differ: settings and outcome, side by side.
 
 use serde_json::{Map, Value, json};
-use tactus_report::{RunReport, run_report};
+use tactus_report::{ResponseCurves, RunReport, run_report};
 
 use super::{ListedRun, several};
 use crate::cli::Common;
@@ -81,7 +81,7 @@ fn facts(report: &RunReport) -> Vec<(String, String)> {
         of("frames lost", run.frames_lost.to_string()),
         of("duration", format!("{:.1} s", run.duration_s)),
     ]);
-    if let Some([mean, deviation]) = report.response.as_ref().and_then(|response| response.slope_spread()) {
+    if let Some([mean, deviation]) = report.response.as_ref().and_then(ResponseCurves::slope_spread) {
         facts.push(of("mean slope of the elements", format!("{mean:.1} counts/mm")));
         facts.push(of("spread of the slopes", format!("{deviation:.1} counts/mm")));
     }
