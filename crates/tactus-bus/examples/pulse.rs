@@ -126,7 +126,10 @@ impl Pulse {
 
     fn answer(&mut self, CommandCall { command, request, reply }: CommandCall) {
         let refusal = match (command, request, &mut self.run) {
-            (Command::Status | Command::Reset | Command::Lease, ..) => None,
+            (
+                Command::Status | Command::Experiments | Command::Plan | Command::Reset | Command::Lease,
+                ..,
+            ) => None,
             (Command::Run, Request::Run(request), run) => {
                 *run = Some(pb::RunState {
                     run_id: format!("{RIG}-1"),

@@ -59,7 +59,7 @@ pub struct CommandCall {
 /// Arguments of a command. Who asks is not empty.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Request {
-    /// Of [`Command::Run`].
+    /// Of [`Command::Run`] and [`Command::Plan`].
     Run(pb::RunRequest),
     /// Of [`Command::Lease`].
     Lease(pb::LeaseRequest),
@@ -249,7 +249,7 @@ fn refusal(exit_code: u32, error: String) -> pb::CommandReply {
 /// Decodes the arguments of a command. A stop is valid whatever its arguments are.
 fn read(command: Command, given: Option<&Encoding>, payload: Option<&ZBytes>) -> Result<Request, String> {
     match command {
-        Command::Run => {
+        Command::Run | Command::Plan => {
             let request: pb::RunRequest = decode(given, payload)?;
             named(&request.who)?;
             Ok(Request::Run(request))
@@ -259,7 +259,7 @@ fn read(command: Command, given: Option<&Encoding>, payload: Option<&ZBytes>) ->
             named(&request.who)?;
             Ok(Request::Lease(request))
         }
-        Command::Status | Command::Pause | Command::Resume | Command::Reset => {
+        Command::Status | Command::Experiments | Command::Pause | Command::Resume | Command::Reset => {
             let request: pb::CommandRequest = decode(given, payload)?;
             named(&request.who)?;
             Ok(Request::Control(request))

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | acquisition (in the engine) | frames, reports of the stage, the supervisor's clock |
 //! | stops (a thread) | `cmd/stop`, `tactus/stop` and datagrams; nothing else, so that no other command can delay it |
-//! | commands | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status` |
+//! | commands | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status`, `cmd/experiments`, `cmd/plan` |
 //! | run | the order of one run, until its recording is closed |
 //! | health | once a second |
 //! | closing of crashed runs (once, at the start) | the disk |
@@ -12,7 +12,9 @@
 //! | inhibitor | the beginning and the end of a run |
 //! | main | a signal that ends the service |
 
+mod catalogue;
 mod commands;
+mod description;
 mod health;
 mod lease;
 mod publish;
@@ -171,7 +173,10 @@ async fn attend(
         .map_err(system("thread"))?;
     let tasks = [
         tokio::spawn(Arc::clone(&desk).answer_commands(commands)),
-        tokio::spawn(health::publish(engine.clone(), bus.publisher())),
+        tokio::spawn(health::publish(engine.clone(), bus.publisher(), {
+            let desk = Arc::clone(&desk);
+            move || desk.holder()
+        })),
         tokio::spawn(notify::feed_watchdog(engine.clone(), desk.recorder(), systemd.clone())),
         tokio::spawn(inhibitor::keep_awake(engine.clone())),
     ];

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::script::resolve;
-use crate::{Arguments, Host, Outcome, RigView, Script, ScriptError, ScriptLimits, execute};
+use crate::script::{declare, resolve};
+use crate::{Arguments, Host, Outcome, Parameter, RigView, Script, ScriptError, ScriptLimits, execute};
 
 /// Evaluates scripts: in this process, or in one of their own.
 pub trait Evaluate: fmt::Debug + Send + Sync {
@@ -33,6 +33,18 @@ pub trait Evaluate: fmt::Debug + Send + Sync {
         limits: &ScriptLimits,
         stopped: &dyn Fn() -> bool,
     ) -> Result<Arguments, ScriptError>;
+
+    /// As [`Script::parameters`], within `limits`. Ends early once `stopped` is true, which is asked now and then.
+    ///
+    /// # Errors
+    /// As [`Script::parameters`]; also a limit of the script's process.
+    fn parameters(
+        &self,
+        script: &Script,
+        rig: &RigView,
+        limits: &ScriptLimits,
+        stopped: &dyn Fn() -> bool,
+    ) -> Result<Vec<Parameter>, ScriptError>;
 }
 
 /// Evaluates in the caller's process: for libraries and tests. The crate's documentation tells what this does not bound.
@@ -61,5 +73,15 @@ impl Evaluate for InThisProcess {
         stopped: &dyn Fn() -> bool,
     ) -> Result<Arguments, ScriptError> {
         resolve(script, arguments, rig, limits, stopped)
+    }
+
+    fn parameters(
+        &self,
+        script: &Script,
+        rig: &RigView,
+        limits: &ScriptLimits,
+        stopped: &dyn Fn() -> bool,
+    ) -> Result<Vec<Parameter>, ScriptError> {
+        Ok(declare(script, &Arguments::default(), rig, limits, stopped)?.parameters)
     }
 }

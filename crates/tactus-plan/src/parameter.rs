@@ -2,11 +2,11 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 /// One declared parameter.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Name.
     pub name: String,
@@ -27,7 +27,7 @@ pub struct Parameter {
 }
 
 /// Type of a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ParameterType {
     /// `true` or `false`.
@@ -54,6 +54,20 @@ impl fmt::Display for ParameterType {
             Self::ListOfInt => "a list of whole numbers",
             Self::ListOfFloat => "a list of numbers",
         })
+    }
+}
+
+impl ParameterType {
+    /// The type's word, as in JSON.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Bool => "bool",
+            Self::Int => "int",
+            Self::Float => "float",
+            Self::String => "string",
+            Self::ListOfInt => "list-of-int",
+            Self::ListOfFloat => "list-of-float",
+        }
     }
 }
 

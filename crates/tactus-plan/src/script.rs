@@ -121,7 +121,8 @@ pub(crate) fn resolve(
     Ok(declare(script, arguments, rig, limits, stopped)?.values)
 }
 
-fn declare(
+/// The declarations of a script's top level, which is all that is evaluated.
+pub(crate) fn declare(
     script: &Script,
     arguments: &Arguments,
     rig: &RigView,

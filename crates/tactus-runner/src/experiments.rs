@@ -12,6 +12,7 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("element-centres", include_str!("../../../experiments/element-centres.star")),
     ("grid-sweep", include_str!("../../../experiments/grid-sweep.star")),
     ("image", include_str!("../../../experiments/image.star")),
+    ("move-to", include_str!("../../../experiments/move-to.star")),
 ];
 
 /// Why there is no such experiment.

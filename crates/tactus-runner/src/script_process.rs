@@ -24,8 +24,8 @@ use std::time::{Duration, Instant};
 use rustix::process::Signal;
 use serde::{Deserialize, Serialize};
 use tactus_plan::{
-    Arguments, Call, Evaluate, Exceeded, Host, Location, Outcome, Refusal, RigView, Script, ScriptError,
-    ScriptLimits,
+    Arguments, Call, Evaluate, Exceeded, Host, Location, Outcome, Parameter, Refusal, RigView, Script,
+    ScriptError, ScriptLimits,
 };
 
 pub use child::main_if_child;
@@ -59,6 +59,8 @@ struct Task {
 enum Purpose {
     /// The values of the parameters only.
     Resolve,
+    /// The declarations of the parameters only.
+    Declare,
     /// The whole script.
     Run { seed: u64 },
 }
@@ -69,6 +71,8 @@ enum Answer {
     /// A step; the script waits for its result.
     Call(Call),
     Resolved(Result<Arguments, ScriptError>),
+    /// The parameters as JSON: their values have any type.
+    Declared(Result<String, ScriptError>),
     Ended(Result<Outcome, ScriptError>),
 }
 
@@ -132,7 +136,7 @@ impl Evaluate for ScriptProcesses {
         let task = Task::new(script, arguments, rig, limits, Purpose::Run { seed });
         match self.converse(&task, host)? {
             Answer::Ended(ended) => ended,
-            Answer::Call(_) | Answer::Resolved(_) => Err(out_of_turn(script)),
+            Answer::Call(_) | Answer::Resolved(_) | Answer::Declared(_) => Err(out_of_turn(script)),
         }
     }
 
@@ -147,7 +151,26 @@ impl Evaluate for ScriptProcesses {
         let task = Task::new(script, arguments, rig, limits, Purpose::Resolve);
         match self.converse(&task, &mut Unasked(stopped))? {
             Answer::Resolved(resolved) => resolved,
-            Answer::Call(_) | Answer::Ended(_) => Err(out_of_turn(script)),
+            Answer::Call(_) | Answer::Ended(_) | Answer::Declared(_) => Err(out_of_turn(script)),
+        }
+    }
+
+    fn parameters(
+        &self,
+        script: &Script,
+        rig: &RigView,
+        limits: &ScriptLimits,
+        stopped: &dyn Fn() -> bool,
+    ) -> Result<Vec<Parameter>, ScriptError> {
+        let task = Task::new(script, &Arguments::default(), rig, limits, Purpose::Declare);
+        match self.converse(&task, &mut Unasked(stopped))? {
+            Answer::Declared(declared) => {
+                serde_json::from_str(&declared?).map_err(|error| ScriptError::Evaluator {
+                    script: script.name().to_owned(),
+                    problem: format!("its parameters cannot be read: {error}"),
+                })
+            }
+            Answer::Call(_) | Answer::Ended(_) | Answer::Resolved(_) => Err(out_of_turn(script)),
         }
     }
 }

@@ -410,6 +410,8 @@ pub struct Health {
     pub clock_uncertainty_s: ::core::option::Option<f64>,
     #[prost(bool, tag = "13")]
     pub simulated: bool,
+    #[prost(string, tag = "14")]
+    pub lease_holder: ::prost::alloc::string::String,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct RunRequest {
@@ -491,6 +493,112 @@ pub struct CommandReply {
     pub depth_max_mm: f64,
     #[prost(message, optional, tag = "14")]
     pub safety: ::core::option::Option<SafetyEvent>,
+    #[prost(message, optional, tag = "15")]
+    pub description: ::core::option::Option<RigDescription>,
+    #[prost(message, repeated, tag = "16")]
+    pub experiments: ::prost::alloc::vec::Vec<Experiment>,
+    #[prost(message, optional, tag = "17")]
+    pub plan: ::core::option::Option<Plan>,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct RigDescription {
+    #[prost(double, repeated, tag = "1")]
+    pub col_centres_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "2")]
+    pub row_centres_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "3")]
+    pub element_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "4")]
+    pub origin_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, tag = "5")]
+    pub rotation_deg: f64,
+    #[prost(double, tag = "6")]
+    pub rate_hz: f64,
+    #[prost(double, tag = "7")]
+    pub full_scale_counts: f64,
+    #[prost(double, repeated, tag = "8")]
+    pub baseline_counts: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, tag = "9")]
+    pub covering_mm: f64,
+    #[prost(string, tag = "10")]
+    pub indenter: ::prost::alloc::string::String,
+    #[prost(string, tag = "11")]
+    pub indenter_shape: ::prost::alloc::string::String,
+    #[prost(double, tag = "12")]
+    pub indenter_width_mm: f64,
+    #[prost(double, repeated, tag = "13")]
+    pub x_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "14")]
+    pub y_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, tag = "15")]
+    pub z_max_mm: f64,
+    #[prost(double, tag = "16")]
+    pub depth_max_mm: f64,
+    #[prost(double, tag = "17")]
+    pub element_max_counts: f64,
+    #[prost(double, tag = "18")]
+    pub sum_max_counts: f64,
+    #[prost(double, tag = "19")]
+    pub baseline_band_counts: f64,
+    #[prost(double, tag = "20")]
+    pub safe_height_mm: f64,
+    #[prost(double, tag = "21")]
+    pub approach_height_mm: f64,
+    #[prost(uint32, repeated, tag = "22")]
+    pub unwatched_elements: ::prost::alloc::vec::Vec<u32>,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Experiment {
+    #[prost(string, tag = "1")]
+    pub name: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub doc: ::prost::alloc::string::String,
+    #[prost(message, repeated, tag = "3")]
+    pub parameters: ::prost::alloc::vec::Vec<Parameter>,
+    #[prost(string, tag = "4")]
+    pub error: ::prost::alloc::string::String,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Parameter {
+    #[prost(string, tag = "1")]
+    pub name: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub kind: ::prost::alloc::string::String,
+    #[prost(string, tag = "3")]
+    pub default_json: ::prost::alloc::string::String,
+    #[prost(string, tag = "4")]
+    pub doc: ::prost::alloc::string::String,
+    #[prost(string, optional, tag = "5")]
+    pub unit: ::core::option::Option<::prost::alloc::string::String>,
+    #[prost(string, repeated, tag = "6")]
+    pub choices_json: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    #[prost(double, optional, tag = "7")]
+    pub min: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "8")]
+    pub max: ::core::option::Option<f64>,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Plan {
+    #[prost(enumeration = "ExitStatus", tag = "1")]
+    pub exit_status: i32,
+    #[prost(string, tag = "2")]
+    pub message: ::prost::alloc::string::String,
+    #[prost(uint32, tag = "3")]
+    pub presses: u32,
+    #[prost(uint32, tag = "4")]
+    pub dwells: u32,
+    #[prost(double, tag = "5")]
+    pub duration_s: f64,
+    #[prost(double, tag = "6")]
+    pub deepest_mm: f64,
+    #[prost(double, tag = "7")]
+    pub depth_max_mm: f64,
+    #[prost(double, repeated, tag = "8")]
+    pub travel_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(uint64, tag = "9")]
+    pub seed: u64,
+    #[prost(string, tag = "10")]
+    pub parameters_json: ::prost::alloc::string::String,
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]

@@ -28,13 +28,17 @@ pub enum Topic {
     SafetyState,
 }
 
-/// A command that the service answers. The request is [`crate::pb::RunRequest`] for [`Command::Run`],
+/// A command that the service answers. The request is [`crate::pb::RunRequest`] for [`Command::Run`] and [`Command::Plan`],
 /// [`crate::pb::LeaseRequest`] for [`Command::Lease`], otherwise [`crate::pb::CommandRequest`]; the answer is
 /// [`crate::pb::CommandReply`]. The service answers only a request to exactly this key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Command {
     /// Report the state of the service.
     Status,
+    /// List the experiments that the service knows by name, with their parameters.
+    Experiments,
+    /// Dry-run an experiment on the rig's twin; nothing moves. A newer one ends an older one that still computes.
+    Plan,
     /// Start an experiment.
     Run,
     /// Hold after the current step.
@@ -77,13 +81,24 @@ impl Topic {
 
 impl Command {
     /// In the order of the enumeration.
-    pub const ALL: [Self; 7] =
-        [Self::Status, Self::Run, Self::Pause, Self::Resume, Self::Stop, Self::Reset, Self::Lease];
+    pub const ALL: [Self; 9] = [
+        Self::Status,
+        Self::Experiments,
+        Self::Plan,
+        Self::Run,
+        Self::Pause,
+        Self::Resume,
+        Self::Stop,
+        Self::Reset,
+        Self::Lease,
+    ];
 
     /// The key below `tactus/<rig>/`.
     pub const fn suffix(self) -> &'static str {
         match self {
             Self::Status => "cmd/status",
+            Self::Experiments => "cmd/experiments",
+            Self::Plan => "cmd/plan",
             Self::Run => "cmd/run",
             Self::Pause => "cmd/pause",
             Self::Resume => "cmd/resume",

@@ -4,6 +4,7 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -19,10 +20,12 @@ use tactus_runner::twin::DryRun;
 use tactus_runner::{experiments, twin};
 use tactus_schema::key::Command;
 use tactus_schema::{MonoTime, Rig, WallTime, pb};
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::time::timeout;
 use tracing::{info, warn};
 
+use super::catalogue;
+use super::description::describe;
 use super::health::health;
 use super::lease::{Lease, Secret};
 
@@ -46,6 +49,10 @@ pub(super) struct CommandDesk {
     /// Of the last run.
     recorder: watch::Sender<Gauge>,
     evaluator: Arc<dyn Evaluate>,
+    /// Counts the requests for a plan: the newest ends the others.
+    plans: Arc<AtomicU64>,
+    /// One list of experiments at a time: each script has a process for a moment.
+    listing: Arc<Semaphore>,
 }
 
 /// What a client wants to run.
@@ -72,6 +79,7 @@ struct Prepared {
 }
 
 /// Why a command was not done.
+#[derive(Debug)]
 struct Refusal {
     exit_code: u32,
     error: String,
@@ -81,7 +89,8 @@ impl CommandDesk {
     pub(super) fn new(engine: Engine, config: ServiceConfig, publisher: Publisher) -> Self {
         let evaluator = Arc::new(ScriptProcesses::of_this_program());
         let recorder = watch::Sender::default();
-        Self { engine, config, publisher, lease: Mutex::default(), recorder, evaluator }
+        let (plans, listing) = (Arc::default(), Arc::new(Semaphore::new(1)));
+        Self { engine, config, publisher, lease: Mutex::default(), recorder, evaluator, plans, listing }
     }
 
     /// What the recorder of the last run shows. Each run has a recorder of its own: an old one may still wait for its disk.
@@ -147,7 +156,28 @@ impl CommandDesk {
                 }
                 (Command::Status, Request::Control(_)) => {
                     let rig_toml = self.config.rig.texts.rig_toml.clone();
-                    call.reply.reply(pb::CommandReply { rig_toml, ..self.reply(Ok(())) });
+                    let description = describe(&self.engine.rig());
+                    call.reply.reply(pb::CommandReply { rig_toml, description, ..self.reply(Ok(())) });
+                }
+                (Command::Experiments, Request::Control(_)) => {
+                    let desk = Arc::clone(&self);
+                    tokio::spawn(async move {
+                        let reply = match desk.experiments().await {
+                            Ok(experiments) => pb::CommandReply { experiments, ..desk.reply(Ok(())) },
+                            Err(refusal) => desk.reply(Err(refusal)),
+                        };
+                        call.reply.reply(reply);
+                    });
+                }
+                (Command::Plan, Request::Run(request)) => {
+                    let desk = Arc::clone(&self);
+                    tokio::spawn(async move {
+                        let reply = match desk.plan(request).await {
+                            Ok(plan) => pb::CommandReply { plan: Some(plan), ..desk.reply(Ok(())) },
+                            Err(refusal) => desk.reply(Err(refusal)),
+                        };
+                        call.reply.reply(reply);
+                    });
                 }
                 // The bus decodes each command's own request, and gives stops to `answer_stops`.
                 (command, request) => {
@@ -232,6 +262,12 @@ impl CommandDesk {
         self.lease.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Who holds the lease now; empty if nobody does.
+    pub(super) fn holder(&self) -> String {
+        let now = self.engine.clock().now().mono;
+        self.lease().holder(now).map(|(holder, _)| holder.to_owned()).unwrap_or_default()
+    }
+
     async fn reset(&self, request: &pb::CommandRequest) -> Result<(), Refusal> {
         self.want_lease(&request.lease)?;
         info!(by = request.who, "reset: clearing the stage's alarm and homing");
@@ -288,6 +324,55 @@ impl CommandDesk {
         Ok(note)
     }
 
+    /// The experiments that are known by name.
+    async fn experiments(&self) -> Result<Vec<pb::Experiment>, Refusal> {
+        let (rig, folder) = (self.engine.rig(), self.config.experiments.clone());
+        let evaluator = Arc::clone(&self.evaluator);
+        let listing = Arc::clone(&self.listing).try_acquire_owned();
+        let listing = listing.map_err(|_| Refusal::not_now("the experiments are being listed: ask again"))?;
+        let list = move || {
+            let list = catalogue::list(folder.as_deref(), &rig, &*evaluator);
+            drop(listing);
+            list
+        };
+        tokio::task::spawn_blocking(list).await.map_err(Refusal::failed)
+    }
+
+    /// Makes the dry run of a request and no more. A newer request ends it.
+    async fn plan(&self, request: pb::RunRequest) -> Result<pb::Plan, Refusal> {
+        let number = self.plans.fetch_add(1, Ordering::Relaxed).wrapping_add(1);
+        let plans = Arc::clone(&self.plans);
+        let is_old = move || plans.load(Ordering::Relaxed) != number;
+        let wanted = self.wanted(request)?;
+        let rig = self.engine.rig();
+        let now = self.engine.clock().now().wall;
+        let depth_max_mm = rig.depth_max_mm().unwrap_or_default();
+        let prepare = {
+            let is_old = is_old.clone();
+            move || prepare(wanted, &rig, now, &is_old)
+        };
+        let prepared = tokio::task::spawn_blocking(prepare).await.map_err(Refusal::failed)?;
+        if is_old() {
+            return Err(Refusal::not_now("a newer dry run has ended this one"));
+        }
+        let Prepared { order, plan, .. } = prepared?;
+        let outcome = &plan.outcome;
+        let travel_mm: Vec<_> = outcome.travel_mm.iter().flatten().copied().collect();
+        let moves = travel_mm.iter().all(|bound_mm| bound_mm.is_finite());
+        Ok(pb::Plan {
+            exit_status: outcome.exit_status.into(),
+            message: if plan.is_possible() { String::new() } else { outcome.message.clone() },
+            presses: outcome.presses,
+            dwells: outcome.dwells,
+            duration_s: outcome.duration_s,
+            deepest_mm: if moves { plan.deepest_mm() } else { 0.0 },
+            depth_max_mm,
+            travel_mm: if moves { travel_mm } else { Vec::new() },
+            seed: order.seed,
+            parameters_json: order.arguments.to_json(),
+        })
+    }
+
     /// Checks the form of a request.
     fn wanted(&self, request: pb::RunRequest) -> Result<Wanted, Refusal> {
         let evaluator = Arc::clone(&self.evaluator);
@@ -333,13 +418,14 @@ impl CommandDesk {
             rig: rig.name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             stage: Some(self.engine.stage_state()),
-            health: Some(health(&self.engine, &self.publisher, (0, MonoTime::default()))),
+            health: Some(health(&self.engine, &self.publisher, (0, MonoTime::default()), self.holder())),
             lease: Some(told(&self.lease(), self.engine.clock().now().mono)),
             note: String::new(),
             rig_toml: String::new(),
             covering_mm: rig.covering.thickness_mm,
             depth_max_mm: rig.depth_max_mm().unwrap_or_default(),
             safety: self.engine.safety(),
+            ..Default::default()
         }
     }
 }

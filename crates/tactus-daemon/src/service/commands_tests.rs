@@ -157,6 +157,67 @@ async fn of_two_clients_that_race_for_the_lease_one_gets_it_each_time() {
     bus.close().await.unwrap();
 }
 
+/// A request that the shipped simulated rig can or cannot do: one press this deep.
+fn press_of(depth_mm: f64) -> pb::RunRequest {
+    let parameters_json = format!(r#"{{"depth_mm": {depth_mm}, "coverings_mm": [1.016]}}"#);
+    pb::RunRequest { experiment: "image".into(), parameters_json, who: "test".into(), ..Default::default() }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_says_what_the_rig_can_do_without_a_lease_and_moves_nothing() {
+    let (_bus, _calls, mut desk) = lab(Vec::new()).await;
+    // The test's program has no main function that evaluates scripts.
+    desk.evaluator = Arc::new(tactus_plan::InThisProcess);
+    let plan = desk.plan(press_of(0.1)).await.map_err(|refusal| refusal.error).unwrap();
+    assert_eq!((plan.exit_status(), plan.presses, plan.dwells), (pb::ExitStatus::Done, 1, 1), "{plan:?}");
+    assert!(
+        plan.duration_s > 0.5 && (plan.deepest_mm - 0.1).abs() < 1e-9 && plan.travel_mm.len() == 6,
+        "{plan:?}"
+    );
+    let plan = desk.plan(press_of(0.9)).await.map_err(|refusal| refusal.error).unwrap();
+    assert_eq!(plan.exit_status(), pb::ExitStatus::Refused, "{plan:?}");
+    assert!(!plan.message.is_empty(), "{plan:?}");
+    let refusal = desk.plan(press_of(-1.0)).await.unwrap_err();
+    assert_eq!(refusal.exit_code, exit::USAGE, "{}", refusal.error);
+    assert_eq!(desk.engine.run_state().run_id, "", "no run has begun");
+    assert_eq!(desk.holder(), "");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_experiments_are_listed_with_their_parameters_one_list_at_a_time() {
+    let (_bus, _calls, mut desk) = lab(Vec::new()).await;
+    desk.evaluator = Arc::new(tactus_plan::InThisProcess);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("broken.star"), "def run(rig):\n    pass\nparam(1)\n").unwrap();
+    desk.config.experiments = Some(folder.path().to_owned());
+    let listed = desk.experiments().await.map_err(|refusal| refusal.error).unwrap();
+    let image = listed.iter().find(|each| each.name == "image").unwrap();
+    let depth = image.parameters.iter().find(|each| each.name == "depth_mm").unwrap();
+    assert_eq!((depth.kind.as_str(), depth.unit.as_deref()), ("float", Some("mm")));
+    assert!(image.error.is_empty() && !image.doc.is_empty());
+    let broken = listed.iter().find(|each| each.name == "broken").unwrap();
+    assert!(!broken.error.is_empty() && broken.parameters.is_empty(), "{broken:?}");
+
+    let taken = Arc::clone(&desk.listing).try_acquire_owned().unwrap();
+    assert_eq!(desk.experiments().await.unwrap_err().exit_code, exit::NOT_NOW);
+    drop(taken);
+    assert!(desk.experiments().await.is_ok());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_rig_is_described_as_it_is_now() {
+    let (_bus, _calls, desk) = lab(Vec::new()).await;
+    let rig = desk.engine.rig();
+    let described = describe(&rig).unwrap();
+    assert_eq!((described.col_centres_mm.len(), described.row_centres_mm.len()), (8, 6));
+    assert_eq!(described.baseline_counts.len(), 48);
+    assert_eq!(Some(described.depth_max_mm), rig.depth_max_mm());
+    assert_eq!(described.indenter_shape, "cylinder");
+    assert!((described.indenter_width_mm - 1.0).abs() < 1e-9);
+    let data = Rig { service: None, ..rig };
+    assert!(describe(&data).is_none());
+}
+
 fn free_endpoint() -> Endpoint {
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     format!("tcp/127.0.0.1:{port}").parse().unwrap()

@@ -9,19 +9,25 @@ use tokio::time::interval;
 
 const PERIOD: Duration = Duration::from_secs(1);
 
-pub(super) async fn publish(engine: Engine, publisher: Publisher) {
+/// `holder` tells who holds the lease.
+pub(super) async fn publish(engine: Engine, publisher: Publisher, holder: impl Fn() -> String + Send) {
     let mut tick = interval(PERIOD);
     let mut before = (0, engine.clock().now().mono);
     loop {
         tick.tick().await;
-        let health = health(&engine, &publisher, before);
+        let health = health(&engine, &publisher, before, holder());
         before = (health.frames, MonoTime::from_ns(health.t_mono_ns));
         publisher.publish(&health);
     }
 }
 
 /// The present health. The frame rate is over the time since `before`.
-pub(super) fn health(engine: &Engine, publisher: &Publisher, before: (u64, MonoTime)) -> pb::Health {
+pub(super) fn health(
+    engine: &Engine,
+    publisher: &Publisher,
+    before: (u64, MonoTime),
+    lease_holder: String,
+) -> pb::Health {
     let now = engine.clock().now();
     let pulse = *engine.pulse().borrow();
     let (frames_before, at_before) = before;
@@ -41,5 +47,6 @@ pub(super) fn health(engine: &Engine, publisher: &Publisher, before: (u64, MonoT
         clock_offset_s: pulse.clock_offset_s.map(|[least_s, _]| least_s),
         clock_uncertainty_s: pulse.clock_offset_s.map(|[least_s, greatest_s]| greatest_s - least_s),
         simulated: engine.rig().simulated,
+        lease_holder,
     }
 }

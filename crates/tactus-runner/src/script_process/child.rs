@@ -8,7 +8,9 @@ use std::process::{self, ExitCode};
 
 use rustix::process::{Resource, Rlimit, Signal, set_parent_process_death_signal, setrlimit};
 use serde::Serialize;
-use tactus_plan::{Call, Evaluate, Host, InThisProcess, Outcome, Refusal, Reply, Script, ScriptLimits};
+use tactus_plan::{
+    Call, Evaluate, Host, InThisProcess, Outcome, Refusal, Reply, Script, ScriptError, ScriptLimits,
+};
 
 use super::frame::{self, FrameReader, FrameWriter};
 use super::{ANSWER_MAX_BYTES, Answer, Purpose, Task};
@@ -66,6 +68,13 @@ fn evaluate(Task { name, source, arguments, rig, limits, purpose }: Task, pipes:
         Purpose::Resolve => Answer::Resolved(script.and_then(|script| {
             InThisProcess.resolve(&script, &arguments, &rig, &limits, &|| pipes.is_alone())
         })),
+        Purpose::Declare => Answer::Declared(script.and_then(|script| {
+            let parameters = InThisProcess.parameters(&script, &rig, &limits, &|| pipes.is_alone())?;
+            serde_json::to_string(&parameters).map_err(|error| ScriptError::Evaluator {
+                script: script.name().to_owned(),
+                problem: error.to_string(),
+            })
+        })),
         Purpose::Run { seed } => Answer::Ended(
             script.and_then(|script| InThisProcess.execute(&script, &arguments, &rig, seed, &limits, pipes)),
         ),
@@ -93,7 +102,9 @@ impl Pipes {
             Answer::Ended(Ok(outcome)) => {
                 Answer::Ended(Ok(Outcome { result: serde_json::Value::Null, ..outcome }))
             }
-            other @ (Answer::Ended(Err(_)) | Answer::Call(_) | Answer::Resolved(_)) => other,
+            other @ (Answer::Ended(Err(_)) | Answer::Call(_) | Answer::Resolved(_) | Answer::Declared(_)) => {
+                other
+            }
         })
     }
 

@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex};
 
 use tactus_device::{Clock, SensorCodec};
 use tactus_plan::{
-    Arguments, Call, Evaluate, Host, InThisProcess, Outcome, Refusal, Reply, RigView, Script, ScriptError,
-    ScriptLimits,
+    Arguments, Call, Evaluate, Host, InThisProcess, Outcome, Parameter, Refusal, Reply, RigView, Script,
+    ScriptError, ScriptLimits,
 };
 use tactus_record::rows;
 use tactus_runner::config::RigFiles;
@@ -176,6 +176,16 @@ impl Evaluate for Listening {
         stopped: &dyn Fn() -> bool,
     ) -> Result<Arguments, ScriptError> {
         InThisProcess.resolve(script, arguments, rig, limits, stopped)
+    }
+
+    fn parameters(
+        &self,
+        script: &Script,
+        rig: &RigView,
+        limits: &ScriptLimits,
+        stopped: &dyn Fn() -> bool,
+    ) -> Result<Vec<Parameter>, ScriptError> {
+        InThisProcess.parameters(script, rig, limits, stopped)
     }
 }
 
