@@ -39,6 +39,9 @@ INTERRUPTION) HOWEVER CAUSED AND ON ANY THEORY OF LIABILITY, WHETHER IN CONTRACT
 OR OTHERWISE) ARISING IN ANY WAY OUT OF THE USE OF THIS SOFTWARE, EVEN IF ADVISED OF THE POSSIBILITY OF SUCH DAMAGE""",
 }
 
+# The page of tactus-web has JavaScript of others, which no crate holds.
+PAGE_LICENCES = pathlib.Path(__file__).resolve().parents[1] / "crates/tactus-web/page/vendor/LICENCES.txt"
+
 LIBUSB_CRATE = "libusb1-sys"
 # The crate states the licence of its bindings only: docs/decisions/0015-libusb-and-hidapi.md.
 LIBUSB_LICENCE = "MIT AND LGPL-2.1-or-later"
@@ -118,6 +121,7 @@ def main():
     print("Third-party code that is linked into the programs of Tactus, with its licences.")
     for text, crates in crates_of_text.items():
         print("\n" + "".join(f"\n# {crate}" for crate in crates) + f"\n\n{text}")
+    print("\n\n# The libraries of the dashboard's page\n\n" + PAGE_LICENCES.read_text().strip())
 
 
 main()
