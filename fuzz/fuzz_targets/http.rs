@@ -7,14 +7,16 @@
 
 #[path = "../../crates/tactus-web/src/guard.rs"]
 mod guard;
+#[path = "../../crates/tactus-web/src/order.rs"]
+mod order;
+#[path = "../../crates/tactus-web/src/page.rs"]
+mod page;
 #[path = "../../crates/tactus-web/src/server.rs"]
 mod server;
 #[path = "../../crates/tactus-web/src/site.rs"]
 mod site;
 #[path = "../../crates/tactus-web/src/token.rs"]
 mod token;
-#[path = "../../crates/tactus-web/src/view.rs"]
-mod view;
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, LazyLock, Mutex};
@@ -46,10 +48,11 @@ const PATIENCE: Duration = Duration::from_secs(30);
 mod live {
     use std::sync::{Arc, Mutex, PoisonError};
 
-    use tactus_schema::key::Command;
-    use tokio::sync::watch;
+    use axum::body::Bytes;
+    use serde_json::Value;
+    use tokio::sync::broadcast;
 
-    use crate::view::View;
+    use crate::order::{Order, Question};
 
     /// Why a command was not done.
     #[derive(Debug)]
@@ -68,12 +71,12 @@ mod live {
     #[derive(Debug, Clone)]
     pub(crate) struct Live {
         done: Arc<Mutex<Done>>,
-        view: watch::Sender<View>,
+        pages: broadcast::Sender<Bytes>,
     }
 
     impl Live {
         pub(crate) fn new() -> Self {
-            Self { done: Arc::default(), view: watch::Sender::new(View::default()) }
+            Self { done: Arc::default(), pages: broadcast::Sender::new(1) }
         }
 
         /// What was done since the last call.
@@ -81,8 +84,33 @@ mod live {
             std::mem::take(&mut self.done.lock().unwrap_or_else(PoisonError::into_inner))
         }
 
-        pub(crate) fn view(&self) -> watch::Receiver<View> {
-            self.view.subscribe()
+        pub(crate) fn join(&self) -> (Bytes, broadcast::Receiver<Bytes>) {
+            (self.whole(), self.pages.subscribe())
+        }
+
+        pub(crate) fn whole(&self) -> Bytes {
+            Bytes::from_static(b"event: view\ndata: {}\n\n")
+        }
+
+        pub(crate) fn history(&self) -> Vec<u8> {
+            vec![0; 8]
+        }
+
+        pub(crate) fn take_zero(&self) -> Result<(), String> {
+            self.count_command();
+            Ok(())
+        }
+
+        pub(crate) async fn ask(&self, question: Question) -> Result<Value, NotDone> {
+            self.count_command();
+            match question {
+                Question::Experiments => Ok(Value::Null),
+                Question::Plan(request) => Err(NotDone::Failed(request.experiment)),
+            }
+        }
+
+        fn count_command(&self) {
+            self.done.lock().unwrap_or_else(PoisonError::into_inner).commands += 1;
         }
 
         pub(crate) async fn stop(&self) -> Result<(), String> {
@@ -90,10 +118,11 @@ mod live {
             Ok(())
         }
 
-        pub(crate) async fn command(&self, command: Command, take_over: Option<&str>) -> Result<(), NotDone> {
-            self.done.lock().unwrap_or_else(PoisonError::into_inner).commands += 1;
-            match (command, take_over) {
-                (Command::Pause, _) => Ok(()),
+        pub(crate) async fn command(&self, order: Order, take_over: Option<&str>) -> Result<String, NotDone> {
+            self.count_command();
+            match (order, take_over) {
+                (Order::Pause, _) => Ok(String::new()),
+                (Order::Run(request), Some(_)) => Ok(request.parameters_json),
                 (_, Some(reason)) => Err(NotDone::Failed(reason.to_owned())),
                 (_, None) => Err(NotDone::Held("another client".into())),
             }

@@ -39,17 +39,33 @@ def web(lab):
 
 
 @pytest.fixture
-def dashboard(web, browser):
-    """The page, with `keep` for a screenshot. Fails on script errors and on console errors or warnings."""
-    page = browser.new_page(viewport={"width": 1180, "height": 900})
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
+def open_page(web, browser):
+    """Opens the dashboard in a new window, with `keep` for a screenshot. Fails on script errors and on console errors or warnings."""
+    pages = []
+    PICTURES.mkdir(parents=True, exist_ok=True)
     # The console also reports a command that the service refuses as an error.
     refused = re.compile("the server responded with a status of (409|423)")
-    page.on("console", lambda message: message.type in ("error", "warning") and not refused.search(message.text) and errors.append(message.text))
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    page.keep = lambda name: page.screenshot(path=PICTURES / f"{name}.png")
-    page.goto(web)
-    yield page
-    page.close()
+
+    def open_page(go=True, viewport=None, **options):
+        page = browser.new_page(viewport=viewport or {"width": 1400, "height": 900}, **options)
+        page.url_with_token = web
+        page.errors = []
+        page.on("pageerror", lambda error: page.errors.append(str(error)))
+        page.on("console", lambda message: message.type in ("error", "warning") and not refused.search(message.text) and page.errors.append(message.text))
+        page.keep = lambda name: page.screenshot(path=PICTURES / f"{name}.png", full_page=True)
+        if go:
+            page.goto(web)
+        pages.append(page)
+        return page
+
+    yield open_page
+    errors = [page.errors for page in pages if page.errors]
+    for page in pages:
+        page.close()
     assert errors == []
+
+
+@pytest.fixture
+def dashboard(open_page):
+    """The page."""
+    return open_page()

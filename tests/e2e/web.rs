@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use prost::Message as _;
-use serde_json::Value;
+use serde_json::{Value, json};
 use tactus_e2e::{Process, ServiceUnderTest, free_endpoint};
 use tactus_schema::key::{Keys, Topic};
 use tactus_schema::pb;
@@ -39,38 +39,77 @@ impl Web {
     }
 
     fn send(&self, request: &str, headers: &str) -> TcpStream {
+        self.send_with(request, headers, "")
+    }
+
+    fn send_with(&self, request: &str, headers: &str, body: &str) -> TcpStream {
         let mut socket = TcpStream::connect(&self.address).unwrap();
         // Only a hang takes a minute.
         socket.set_read_timeout(Some(Duration::from_mins(1))).unwrap();
         let host =
             if headers.contains("Host:") { String::new() } else { format!("Host: {}\r\n", self.address) };
-        write!(socket, "{request} HTTP/1.0\r\n{host}{headers}Content-Length: 0\r\n\r\n").unwrap();
+        let length = body.len();
+        write!(socket, "{request} HTTP/1.0\r\n{host}{headers}Content-Length: {length}\r\n\r\n{body}")
+            .unwrap();
         socket
     }
 
     /// Status code, and the whole response.
     fn ask(&self, request: &str, headers: &str) -> (u16, String) {
-        let mut answer = String::new();
-        self.send(request, headers).read_to_string(&mut answer).unwrap();
-        let status = answer.split(' ').nth(1).and_then(|code| code.parse().ok());
-        (status.unwrap_or_else(|| panic!("no status: {answer}")), answer)
+        read_answer(self.send(request, headers))
     }
 
-    /// Waits for the first view that fulfils a condition.
-    fn until(&self, is_it: impl Fn(&Value) -> bool) -> Value {
-        let lines = BufReader::new(self.send("GET /live", "")).lines();
-        let views =
-            lines.map_while(Result::ok).filter_map(|line| line.strip_prefix("data: ").map(str::to_owned));
-        let mut last = String::new();
-        for text in views {
-            let view: Value = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"));
-            if is_it(&view) {
-                return view;
-            }
-            last = text;
-        }
-        panic!("the views ended with {last}")
+    /// Status code and body of a request with the token and a body.
+    fn order(&self, path: &str, body: &Value) -> (u16, String) {
+        let body = if body.is_null() { String::new() } else { body.to_string() };
+        let (status, answer) = read_answer(self.send_with(&format!("POST {path}"), &self.token, &body));
+        let (_, text) = answer.split_once("\r\n\r\n").unwrap();
+        (status, text.to_owned())
     }
+    /// Waits until what a page knows fulfils a condition: `rig` and `view` put together, the `frame`, the `log` so far.
+    fn until(&self, is_it: impl Fn(&Value) -> bool) -> Value {
+        let mut known = json!({ "log": [], "frame": null });
+        let mut kind = String::new();
+        for line in BufReader::new(self.send("GET /live", "")).lines().map_while(Result::ok) {
+            if let Some(event) = line.strip_prefix("event: ") {
+                event.clone_into(&mut kind);
+            }
+            let Some(text) = line.strip_prefix("data: ") else { continue };
+            let told: Value = serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"));
+            match kind.as_str() {
+                "frame" => known["frame"] = told,
+                "log" => known["log"].as_array_mut().unwrap().extend(told.as_array().unwrap().clone()),
+                "rig" | "view" => {
+                    known.as_object_mut().unwrap().extend(told.as_object().unwrap().clone());
+                    if known["problem"] != "" {
+                        known["frame"] = Value::Null;
+                    }
+                }
+                other => panic!("an event {other}: {text}"),
+            }
+            if is_it(&known) {
+                return known;
+            }
+        }
+        panic!("the views ended with {known}")
+    }
+}
+
+fn read_answer(mut socket: TcpStream) -> (u16, String) {
+    let mut answer = Vec::new();
+    socket.read_to_end(&mut answer).unwrap();
+    let answer = String::from_utf8_lossy(&answer).into_owned();
+    let status = answer.split(' ').nth(1).and_then(|code| code.parse().ok());
+    (status.unwrap_or_else(|| panic!("no status: {answer}")), answer)
+}
+
+/// Sum of the rises above the zero that all viewers share.
+fn sum_of_rises(known: &Value) -> f64 {
+    let numbers = |value: &Value| -> Vec<f64> {
+        value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+    };
+    let (counts, zero) = (numbers(&known["frame"]["counts"]), numbers(&known["zero"]["counts"]));
+    counts.iter().zip(zero).map(|(counts, zero)| counts - zero).sum()
 }
 
 #[test]
@@ -84,7 +123,7 @@ fn the_page_shows_live_frames_and_stops_a_run() {
             && page.contains("content-security-policy: default-src 'none'"),
         "{page}"
     );
-    for file in ["/script.js", "/style.css"] {
+    for file in ["/stop.js", "/main.js", "/style.css", "/vendor/uPlot.esm.js", "/vendor/LICENCES.txt"] {
         assert_eq!(web.ask(&format!("GET {file}"), "").0, 200, "{file}");
     }
     let first = web.until(|view| view["frame"].is_object() && view["health"].is_object());
@@ -111,6 +150,109 @@ fn the_page_shows_live_frames_and_stops_a_run() {
     assert!(ended["run"]["message"].as_str().unwrap().contains("stopped by dashboard"), "{ended}");
     assert_eq!(client.wait().0, Some(1));
     assert_eq!(web.ask("POST /resume", &web.token).0, 409, "there is no run to go on with");
+}
+
+#[test]
+fn a_page_that_opens_in_mid_press_has_the_runs_zero_and_the_last_minutes() {
+    let lab = ServiceUnderTest::start(|rig| rig);
+    let early = Web::start(&lab, &lab.endpoint);
+    let known = early.until(|known| known["frame"].is_object() && known["zero"].is_object());
+    assert_eq!(known["zero"]["source"], "rig file", "{known}");
+    let script = lab.script("hold.star", HOLD);
+    let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
+    let deep = |known: &Value| known["frame"]["tip_mm"][2].as_f64().is_some_and(|z_mm| z_mm < -0.29);
+    let is_pressed = |known: &Value| deep(known) && known["zero"]["source"] == "tare";
+    let seen = early.until(is_pressed);
+    assert!(sum_of_rises(&seen) > 100.0, "{seen}");
+    // A page, and a dashboard, that begin now show the same zero.
+    let late = Web::start(&lab, &lab.endpoint);
+    for web in [&early, &late] {
+        let known = web.until(is_pressed);
+        assert_eq!(known["zero"], seen["zero"]);
+        assert!(sum_of_rises(&known) > 100.0, "{known}");
+        assert_eq!(known["run"]["run_id"], known["zero"]["run_id"]);
+        let log = known["log"].to_string();
+        assert!(log.contains("hold started by") && log.contains("a new zero"), "{log}");
+    }
+    // The last minutes: more than the frame that a page begins with.
+    let mut history = Vec::new();
+    early.send("GET /history", "").read_to_end(&mut history).unwrap();
+    let body = history.windows(4).position(|four| four == b"\r\n\r\n").unwrap() + 4;
+    let number =
+        |at: usize| u32::from_le_bytes(history[body + at..body + at + 4].try_into().unwrap()) as usize;
+    assert_eq!(number(0), 48);
+    assert!(number(4) > 30, "{}", number(4));
+    assert_eq!(history.len() - body, 8 + number(4) * (32 + 4 * 48));
+    // A zero under load would be wrong.
+    let (status, answer) = early.order("/zero", &Value::Null);
+    assert!(status == 409 && answer.contains("a run is in progress"), "{answer}");
+    assert_eq!(early.ask("POST /stop", "").0, 204);
+    early.until(|known| known["run"]["phase"] == "finished");
+    assert_eq!(client.wait().0, Some(1));
+    assert_eq!(early.ask("POST /zero", "").0, 401, "what all viewers see changes with the token only");
+    assert_eq!(early.order("/zero", &Value::Null).0, 204);
+    let known = early.until(|known| known["zero"]["source"] == "taken here" && known["frame"].is_object());
+    assert!(sum_of_rises(&known).abs() < 200.0, "{known}");
+}
+
+#[test]
+fn an_experiment_is_listed_checked_and_run_from_the_page() {
+    let lab = ServiceUnderTest::start(|rig| rig);
+    let web = Web::start(&lab, &lab.endpoint);
+    web.until(|known| known["description"].is_object());
+    assert_eq!(web.ask("POST /experiments", "").0, 401);
+    let (status, listed) = web.order("/experiments", &Value::Null);
+    assert_eq!(status, 200, "{listed}");
+    let listed: Value = serde_json::from_str(&listed).unwrap();
+    let image = listed.as_array().unwrap().iter().find(|each| each["name"] == "image").unwrap();
+    let depth =
+        image["parameters"].as_array().unwrap().iter().find(|each| each["name"] == "depth_mm").unwrap();
+    assert_eq!((&depth["kind"], &depth["unit"]), (&json!("float"), &json!("mm")));
+
+    // The verdict is of the rig that will run.
+    let form = |depth_mm: f64| json!({ "experiment": "image", "parameters": { "depth_mm": depth_mm, "coverings_mm": [1.016] } });
+    assert_eq!(web.ask("POST /plan", "").0, 401);
+    let (status, verdict) = web.order("/plan", &form(0.1));
+    let verdict: Value =
+        serde_json::from_str(&verdict).unwrap_or_else(|error| panic!("{status} {error}: {verdict}"));
+    assert_eq!((&verdict["possible"], &verdict["presses"]), (&json!(true), &json!(1)), "{verdict}");
+    assert!(verdict["duration_s"].as_f64().unwrap() > 0.5, "{verdict}");
+    let (_, verdict) = web.order("/plan", &form(0.9));
+    let verdict: Value = serde_json::from_str(&verdict).unwrap();
+    assert!(
+        verdict["possible"] == false && verdict["message"].as_str().unwrap().contains("depth"),
+        "{verdict}"
+    );
+    for (body, status, words) in [
+        (form(-1.0), 409, "depth_mm"),
+        (json!({ "experiment": "../secrets" }), 409, "no experiment"),
+        (json!({ "experiment": "image", "script": "def run(rig): pass" }), 400, "unknown field"),
+    ] {
+        let (given, answer) = web.order("/plan", &body);
+        assert!(given == status && answer.contains(words), "{given} {answer}");
+        assert_eq!(web.order("/run", &body).0, status, "{body}");
+    }
+    // Nothing has moved, and nobody has the lease.
+    let known = web.until(|known| known["health"]["lease_holder"] == "");
+    assert_eq!(known["run"]["run_id"], "", "{known}");
+
+    let run = json!({ "experiment": "image", "parameters": { "coverings_mm": [1.016] }, "seed": "7", "who": "ada" });
+    let (status, answer) = web.order("/run", &run);
+    assert_eq!(status, 204, "{answer}");
+    let ended = web.until(|known| known["run"]["phase"] == "finished");
+    assert_eq!(
+        (&ended["run"]["exit_status"], &ended["run"]["who"]),
+        (&json!("done"), &json!("ada")),
+        "{ended}"
+    );
+    let (status, answer) = web.order("/move", &json!({ "x_mm": 3.0, "y_mm": 2.0 }));
+    assert_eq!(status, 204, "{answer}");
+    let moved =
+        web.until(|known| known["run"]["experiment"] == "move-to" && known["run"]["phase"] == "finished");
+    let at = |known: &Value, axis: &str| known["stage"][axis].as_f64().unwrap();
+    assert!((at(&moved, "x_mm") - 23.0).abs() < 0.01 && (at(&moved, "z_mm") - 2.0).abs() < 0.01, "{moved}");
+    let (status, answer) = web.order("/move", &json!({ "x_mm": 300.0, "y_mm": 2.0 }));
+    assert!(status == 409 && answer.contains("envelope"), "{status} {answer}");
 }
 
 #[test]

@@ -83,9 +83,16 @@ class Process:
 
     def truth(self):
         """What is true of virtual devices now."""
-        self.process.stdin.write("truth\n")
+        return json.loads(self._ask("truth", "{"))
+
+    def tell(self, fault):
+        """Injects a fault into virtual devices, such as `sensor stall 2s`."""
+        self._ask(fault, "ok")
+
+    def _ask(self, line, answer):
+        self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
-        return json.loads(self.wait_for("{"))
+        return self.wait_for(answer)
 
     def end(self):
         self.process.terminate()

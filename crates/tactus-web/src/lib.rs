@@ -1,24 +1,35 @@
-//! The dashboard: a page with the live image, the stage, the run, and STOP.
+//! The dashboard: a page with the live image, the stage, the run, its log, and STOP.
 //!
 //! It is a separate process without devices or files, and an ordinary client of the bus. Input from browsers never reaches
 //! the process that acquires frames.
 //!
 //! | path | what |
 //! |---|---|
-//! | `GET /` | the page; its script and style have their own paths |
-//! | `GET /live` | server-sent events, each with the whole view as JSON, at most 20 per second |
+//! | `GET /` | the page; its scripts and style have their own paths |
+//! | `GET /live` | server-sent events: `rig`, `view`, `log` and `frame`, first all of them, then each when it changes |
+//! | `GET /history` | the frames of the last minutes, as numbers |
 //! | `POST /stop` | stops the rig, whether the service is ready or not |
-//! | `POST /pause`, `/resume`, `/reset` | sends the command of that name to the service: needs the header `x-tactus-token`; `x-take-over` has the reason to take over the lease |
+//! | `POST /experiments` | the list of experiments with their parameters: needs the header `x-tactus-token`, as all that follow |
+//! | `POST /plan` | a dry run on the rig's twin, in the service |
+//! | `POST /zero` | a new zero for all viewers, with the tip up and no run in progress |
+//! | `POST /run`, `/move`, `/pause`, `/resume`, `/reset` | sends a command to the service, with the lease; `x-take-over` has the reason to take over the lease |
 //!
-//! A slow browser misses views and delays nothing. Requests from pages of other sites are refused. Connections that ask nothing are
+//! This process keeps the zero and the last minutes, so that all pages show the same numbers, whenever they were opened. It writes
+//! each message once, however many pages there are. A slow browser misses messages and delays nothing. Requests from pages of other sites are refused. Connections that ask nothing are
 //! closed to make room, so that a stop always finds a place.
 
+mod board;
+mod feed;
 mod guard;
+mod history;
 mod live;
+mod log;
+mod order;
+mod page;
 mod server;
 mod site;
 mod token;
-mod view;
+mod zero;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -47,7 +58,7 @@ struct Options {
     /// Name of the rig, if several are served.
     #[arg(long, env = "TACTUS_RIG")]
     rig: Option<String>,
-    /// Address of the page. Whoever reaches it can look and stop; pause, resume and reset want the token. The default is
+    /// Address of the page. Whoever reaches it can look and stop; all other commands want the token. The default is
     /// reachable from this machine only.
     #[arg(long, env = "TACTUS_WEB_LISTEN", default_value = "127.0.0.1:7480")]
     listen: SocketAddr,

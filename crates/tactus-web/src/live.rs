@@ -1,28 +1,35 @@
-//! The connection to the service, restored whenever it is lost, and the latest view.
+//! The connection to the service, restored whenever it is lost, and what the pages are told.
 
-use std::sync::Arc;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use axum::body::Bytes;
+use serde_json::{Value, json};
 use tactus_bus::{BusError, Client, Credentials, Endpoint, History, Hold};
 use tactus_schema::key::Command;
-use tactus_schema::pb;
-use tokio::sync::watch;
-use tokio::time::{sleep, timeout};
+use tactus_schema::pb::{self, run_event::Event};
+use tokio::sync::{broadcast, watch};
+use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 use tracing::{info, warn};
 
-use crate::view::View;
+use crate::board::Board;
+use crate::feed::Feed;
+use crate::order::{Order, Question};
 
 /// Time between two attempts to connect.
 const AGAIN: Duration = Duration::from_secs(1);
-/// Time limit for replies, except to `reset`.
+/// Time limit for replies, except to `reset`, `run` and `plan`.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// How long a command waits for the connection to be restored.
 const RECONNECTED: Duration = Duration::from_secs(2);
 /// Time limit for the reply to `reset`, because homing is slow.
 const HOMING_PATIENCE: Duration = Duration::from_mins(2);
-
+/// Time limit for the replies to `run` and `plan`, because a dry run computes.
+const DRY_RUN_PATIENCE: Duration = Duration::from_mins(5);
 /// Time limit for the replies to a stop on the bus; a datagram is answered at once.
 const STOP_PATIENCE: Duration = Duration::from_secs(5);
+/// Time between two views of what is no frame.
+const VIEW_PERIOD: Duration = Duration::from_millis(100);
 /// This program's name for the service.
 const WHO: &str = "dashboard";
 
@@ -49,12 +56,14 @@ impl Service {
     }
 }
 
-/// Connection to the rig, and its latest view.
+/// Connection to the rig, and what the pages show.
 #[derive(Debug, Clone)]
 pub(crate) struct Live {
     service: Arc<Service>,
     client: watch::Receiver<Option<Arc<Client>>>,
-    view: watch::Receiver<View>,
+    feed: Arc<Mutex<Feed>>,
+    /// Pages that want the list of experiments wait for each other: the service makes one at a time.
+    listing: Arc<tokio::sync::Mutex<()>>,
 }
 
 impl Live {
@@ -63,37 +72,69 @@ impl Live {
         let (to_client, client) = watch::channel(None);
         let service = Arc::new(Service { endpoint, rig });
         let problem = format!("no service at {} yet", service.endpoint());
-        let (to_view, view) = watch::channel(View { problem, ..View::default() });
-        let own = Arc::clone(&service);
-        tokio::spawn(async move {
-            loop {
-                let problem = match Client::connect(&own.endpoint(), own.rig.as_deref()).await {
-                    Ok(client) => {
-                        let client = Arc::new(client);
-                        info!(rig = client.rig(), "connected");
-                        to_view.send_replace(View { rig: client.rig().to_owned(), ..View::default() });
-                        to_client.send_replace(Some(Arc::clone(&client)));
-                        let ended = follow(&client, &to_view).await;
-                        let problem = ended.map_or_else(
-                            |error| error.to_string(),
-                            |()| format!("the service of rig {} has ended", client.rig()),
-                        );
-                        warn!(problem, "connection lost");
-                        problem
-                    }
-                    Err(error) => error.to_string(),
-                };
-                to_view.send_replace(View { problem, ..View::default() });
-                to_client.send_replace(None);
-                sleep(AGAIN).await;
-            }
-        });
-        Self { service, client, view }
+        let feed = Arc::new(Mutex::new(Feed::new(Board { problem, ..Board::default() })));
+        let live = Self { service, client, feed, listing: Arc::default() };
+        tokio::spawn(live.clone().keep_connected(to_client));
+        live
     }
 
-    /// The latest view and its changes.
-    pub(crate) fn view(&self) -> watch::Receiver<View> {
-        self.view.clone()
+    async fn keep_connected(self, to_client: watch::Sender<Option<Arc<Client>>>) {
+        loop {
+            let problem = match Client::connect(&self.service.endpoint(), self.service.rig.as_deref()).await {
+                Ok(client) => {
+                    let client = Arc::new(client);
+                    info!(rig = client.rig(), "connected");
+                    self.feed().board.connected(client.rig());
+                    to_client.send_replace(Some(Arc::clone(&client)));
+                    let ended = self.follow(&client).await;
+                    let problem = ended.map_or_else(
+                        |error| error.to_string(),
+                        |()| format!("the service of rig {} has ended", client.rig()),
+                    );
+                    warn!(problem, "connection lost");
+                    problem
+                }
+                Err(error) => error.to_string(),
+            };
+            {
+                let mut feed = self.feed();
+                feed.board.disconnected(&problem, now_wall_ns());
+                feed.tell();
+            }
+            to_client.send_replace(None);
+            sleep(AGAIN).await;
+        }
+    }
+
+    fn feed(&self) -> MutexGuard<'_, Feed> {
+        // What a panic left is as good as what was there before.
+        self.feed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// All that a page needs first, and what follows it. A page that is slower than 64 messages misses the oldest.
+    pub(crate) fn join(&self) -> (Bytes, broadcast::Receiver<Bytes>) {
+        self.feed().join()
+    }
+
+    /// All that a page needs after it has missed something.
+    pub(crate) fn whole(&self) -> Bytes {
+        self.feed().whole()
+    }
+
+    /// The last minutes, as [`crate::history::History::bytes`] has them.
+    pub(crate) fn history(&self) -> Vec<u8> {
+        self.feed().board.history.bytes()
+    }
+
+    /// Takes a zero for all viewers.
+    ///
+    /// # Errors
+    /// As [`Board::take_zero`].
+    pub(crate) fn take_zero(&self) -> Result<(), String> {
+        let mut feed = self.feed();
+        feed.board.take_zero()?;
+        feed.tell();
+        Ok(())
     }
 
     /// Stops the rig, connected or not.
@@ -115,35 +156,138 @@ impl Live {
         answers.map_err(in_words)?.iter().try_for_each(done)
     }
 
-    /// Sends a command that needs the lease. Takes the lease for it; given a reason, takes it over if another client holds it.
+    /// Sends a command that needs the lease. Takes the lease for it; given a reason, takes it over if another client holds it. Returns
+    /// what who asks should know besides.
     ///
     /// # Errors
     /// What keeps the rig from doing it.
-    pub(crate) async fn command(&self, command: Command, take_over: Option<&str>) -> Result<(), NotDone> {
+    pub(crate) async fn command(&self, order: Order, take_over: Option<&str>) -> Result<String, NotDone> {
+        let client = self.connected().await?;
+        let who = order.who().unwrap_or(WHO).to_owned();
+        let held =
+            match client.hold(&who, take_over).await.map_err(|error| NotDone::Failed(in_words(error)))? {
+                Hold::Held(held) => held,
+                Hold::Refused(reply) => return Err(NotDone::Held(reply.error)),
+            };
+        let reason = take_over.unwrap_or("button").to_owned();
+        let control = pb::CommandRequest { who, reason, lease: held.secret(), ..Default::default() };
+        let reply = match order {
+            Order::Pause => client.command(Command::Pause, &control, PATIENCE).await,
+            Order::Resume { covering_mm } => {
+                let control = pb::CommandRequest { covering_mm, ..control };
+                client.command(Command::Resume, &control, PATIENCE).await
+            }
+            Order::Reset => client.command(Command::Reset, &control, HOMING_PATIENCE).await,
+            Order::Run(request) => {
+                let request = pb::RunRequest { who: control.who, lease: control.lease, ..request };
+                client.command(Command::Run, &request, DRY_RUN_PATIENCE).await
+            }
+        };
+        if let Err(error) = held.release().await {
+            warn!(%error, "the lease was not given back; it ends by itself");
+        }
+        let reply = reply.map_err(|error| NotDone::Failed(in_words(error)))?;
+        done(&reply).map_err(NotDone::Failed)?;
+        Ok(reply.note)
+    }
+
+    /// Asks for something that commands nothing. JSON for the page.
+    ///
+    /// # Errors
+    /// What the service says, or why there is none.
+    pub(crate) async fn ask(&self, question: Question) -> Result<Value, NotDone> {
+        let client = self.connected().await?;
+        let reply = match question {
+            Question::Experiments => {
+                let _turn = self.listing.lock().await;
+                let request = pb::CommandRequest { who: WHO.into(), ..Default::default() };
+                client.command(Command::Experiments, &request, DRY_RUN_PATIENCE).await
+            }
+            Question::Plan(request) => {
+                let request = pb::RunRequest { who: WHO.into(), ..request };
+                client.command(Command::Plan, &request, DRY_RUN_PATIENCE).await
+            }
+        };
+        let reply = reply.map_err(|error| NotDone::Failed(in_words(error)))?;
+        done(&reply).map_err(NotDone::Failed)?;
+        Ok(match &reply.plan {
+            Some(plan) => plan_json(plan),
+            None => reply.experiments.iter().map(experiment_json).collect(),
+        })
+    }
+
+    async fn connected(&self) -> Result<Arc<Client>, NotDone> {
         let mut clients = self.client.clone();
         let client = match timeout(RECONNECTED, clients.wait_for(Option::is_some)).await {
             Ok(Ok(client)) => client.clone(),
             Ok(Err(_)) | Err(_) => None,
         };
-        let Some(client) = client else { return Err(NotDone::Failed(self.view.borrow().problem.clone())) };
-        let held =
-            match client.hold(WHO, take_over).await.map_err(|error| NotDone::Failed(in_words(error)))? {
-                Hold::Held(held) => held,
-                Hold::Refused(reply) => return Err(NotDone::Held(reply.error)),
-            };
-        let request = pb::CommandRequest {
-            who: WHO.into(),
-            reason: take_over.unwrap_or("button").into(),
-            lease: held.secret(),
-            ..Default::default()
-        };
-        let patience = if command == Command::Reset { HOMING_PATIENCE } else { PATIENCE };
-        let reply = client.command(command, &request, patience).await;
-        if let Err(error) = held.release().await {
-            warn!(%error, "the lease was not given back; it ends by itself");
+        client.ok_or_else(|| NotDone::Failed(self.feed().board.problem.clone()))
+    }
+
+    /// Keeps the board up to date until the service ends.
+    async fn follow(&self, client: &Client) -> Result<(), BusError> {
+        let mut alive = client.alive();
+        if !alive.now() {
+            return Ok(());
         }
-        let reply = reply.map_err(|error| NotDone::Failed(in_words(error)))?;
-        done(&reply).map_err(NotDone::Failed)
+        let mut infos = client.subscribe::<pb::SensorInfo>(History::Last).await?;
+        let mut stages = client.subscribe::<pb::StageState>(History::Last).await?;
+        let mut runs = client.subscribe::<pb::RunState>(History::Last).await?;
+        let mut safety = client.subscribe::<pb::SafetyEvent>(History::Last).await?;
+        let mut health = client.subscribe::<pb::Health>(History::Last).await?;
+        let mut events = client.subscribe::<pb::RunEvent>(History::All).await?;
+        let mut frames = client.subscribe::<pb::Frame>(History::All).await?;
+        let mut views = interval(VIEW_PERIOD);
+        views.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        // Asked again after each change of covering.
+        let mut is_asking = true;
+        let description = describe(client);
+        tokio::pin!(description);
+        loop {
+            tokio::select! {
+                // Frames last: what was told of them before is known then. Whatever else comes is rare.
+                biased;
+                there = alive.changed() => if there != Some(true) {
+                    return Ok(());
+                },
+                Some(info) = infos.recv() => self.feed().board.info = Some(info),
+                Some(stage) = stages.recv() => self.feed().board.stage = Some(stage),
+                Some(run) = runs.recv() => self.feed().board.run = Some(run),
+                Some(event) = safety.recv() => self.feed().board.on_safety(event),
+                Some(pulse) = health.recv() => self.feed().board.on_health(pulse),
+                Some(event) = events.recv() => {
+                    if matches!(event.event, Some(Event::CoveringChanged(_))) {
+                        description.set(describe(client));
+                        is_asking = true;
+                    }
+                    self.feed().board.on_event(&event);
+                }
+                described = &mut description, if is_asking => {
+                    is_asking = false;
+                    if let Some(described) = described {
+                        self.feed().board.on_description(described);
+                    }
+                }
+                _ = views.tick() => self.feed().tell(),
+                Some(frame) = frames.recv() => {
+                    let missed = frames.losses().missed + frames.losses().overrun;
+                    self.feed().on_frame(frame, missed);
+                }
+            }
+        }
+    }
+}
+
+/// The rig as it is now; `None` if the service does not tell.
+async fn describe(client: &Client) -> Option<pb::RigDescription> {
+    let request = pb::CommandRequest { who: WHO.into(), ..Default::default() };
+    match client.command(Command::Status, &request, PATIENCE).await {
+        Ok(reply) => reply.description,
+        Err(error) => {
+            warn!(%error, "the service does not describe its rig");
+            None
+        }
     }
 }
 
@@ -156,35 +300,46 @@ fn in_words(error: BusError) -> String {
     format!("{:#}", anyhow::Error::from(error))
 }
 
-/// Keeps `view` up to date until the service ends.
-async fn follow(client: &Client, view: &watch::Sender<View>) -> Result<(), BusError> {
-    let mut alive = client.alive();
-    if !alive.now() {
-        return Ok(());
-    }
-    let mut frames = client.subscribe::<pb::Frame>(History::Last).await?;
-    let mut infos = client.subscribe::<pb::SensorInfo>(History::Last).await?;
-    let mut stages = client.subscribe::<pb::StageState>(History::Last).await?;
-    let mut runs = client.subscribe::<pb::RunState>(History::Last).await?;
-    let mut safety = client.subscribe::<pb::SafetyEvent>(History::Last).await?;
-    let mut health = client.subscribe::<pb::Health>(History::Last).await?;
-    loop {
-        tokio::select! {
-            Some(frame) = frames.recv() => {
-                let missed = frames.losses().missed + frames.losses().overrun;
-                view.send_modify(|view| {
-                    view.frame = Some(frame);
-                    view.missed = missed;
-                });
-            }
-            Some(info) = infos.recv() => view.send_modify(|view| view.info = Some(info)),
-            Some(stage) = stages.recv() => view.send_modify(|view| view.stage = Some(stage)),
-            Some(run) = runs.recv() => view.send_modify(|view| view.run = Some(run)),
-            Some(event) = safety.recv() => view.send_modify(|view| view.safety = Some(event)),
-            Some(pulse) = health.recv() => view.send_modify(|view| view.health = Some(pulse)),
-            there = alive.changed() => if there != Some(true) {
-                return Ok(());
-            },
-        }
-    }
+fn now_wall_ns() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+}
+
+fn plan_json(plan: &pb::Plan) -> Value {
+    json!({
+        "possible": plan.exit_status() == pb::ExitStatus::Done,
+        "exit_status": plan.exit_status().word(),
+        "message": plan.message,
+        "presses": plan.presses,
+        "dwells": plan.dwells,
+        "duration_s": plan.duration_s,
+        "deepest_mm": plan.deepest_mm,
+        "depth_max_mm": plan.depth_max_mm,
+        "travel_mm": plan.travel_mm,
+        // A text: the page's numbers have 53 bits.
+        "seed": plan.seed.to_string(),
+        "parameters": json_or_null(&plan.parameters_json),
+    })
+}
+
+fn experiment_json(experiment: &pb::Experiment) -> Value {
+    json!({
+        "name": experiment.name,
+        "doc": experiment.doc,
+        "error": experiment.error,
+        "parameters": experiment.parameters.iter().map(|parameter| json!({
+            "name": parameter.name,
+            "kind": parameter.kind,
+            "default": json_or_null(&parameter.default_json),
+            "doc": parameter.doc,
+            "unit": parameter.unit,
+            "choices": parameter.choices_json.iter().map(|text| json_or_null(text)).collect::<Vec<_>>(),
+            "min": parameter.min,
+            "max": parameter.max,
+        })).collect::<Vec<_>>(),
+    })
+}
+
+fn json_or_null(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_default()
 }

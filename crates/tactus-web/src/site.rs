@@ -2,35 +2,33 @@
 
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::time::Duration;
 
 use axum::Router;
-use axum::extract::{Path, State};
+use axum::body::{Body, Bytes};
+use axum::extract::{DefaultBodyLimit, Path, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{from_fn_with_state, map_response};
-use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use futures_util::{Stream, stream};
-use tactus_schema::key::Command;
+use serde_json::Value;
 use tokio::sync::Semaphore;
-use tokio::time::{Instant, sleep_until};
+use tokio::sync::broadcast::{self, error::RecvError};
 
 use crate::guard::{Hosts, guard};
 use crate::live::{Live, NotDone};
+use crate::order::{Order, Question};
+use crate::page;
 use crate::token::Token;
 
-/// Shortest time between two views sent to one page.
-const PERIOD: Duration = Duration::from_millis(50);
 /// Open pages at most.
 const PAGES_MAX: usize = 64;
+/// Longest body of a request: the parameters of an experiment.
+const BODY_BYTES_MAX: usize = 64 << 10;
 
 /// Carries the reason to take over the lease.
 const TAKE_OVER: HeaderName = HeaderName::from_static("x-take-over");
 
-const HTML: &str = include_str!("../page/index.html");
-const STYLE: &str = include_str!("../page/style.css");
-const SCRIPT: &str = include_str!("../page/script.js");
 /// The page loads nothing from other sites and cannot be embedded in other pages.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -47,17 +45,19 @@ struct Shared {
 
 /// The whole site.
 pub(crate) fn site(live: Live, hosts: Arc<Hosts>, token: Arc<Token>) -> Router {
-    let file = |kind: &'static str, text: &'static str| {
-        get(move || async move { ([(header::CONTENT_TYPE, kind)], text) })
-    };
-    Router::new()
-        .route("/", file("text/html; charset=utf-8", HTML))
-        .route("/style.css", file("text/css; charset=utf-8", STYLE))
-        .route("/script.js", file("text/javascript; charset=utf-8", SCRIPT))
-        .route("/live", get(live_views))
+    let mut site = Router::new();
+    for file in page::FILES {
+        site = site.route(file.path, get(async move || ([(header::CONTENT_TYPE, file.kind)], file.text)));
+    }
+    site.route("/live", get(live_views))
+        .route("/history", get(history))
         .route("/stop", post(stop))
+        .route("/zero", post(zero))
+        .route("/experiments", post(experiments))
+        .route("/plan", post(plan))
         .route("/{command}", post(command))
         .with_state(Shared { live, token, pages: Arc::new(Semaphore::new(PAGES_MAX)) })
+        .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
         .layer(from_fn_with_state(hosts, guard))
         .layer(map_response(with_policy))
 }
@@ -76,19 +76,32 @@ async fn live_views(State(Shared { live, pages, .. }): State<Shared>) -> Respons
         return (StatusCode::SERVICE_UNAVAILABLE, format!("{PAGES_MAX} pages are open already"))
             .into_response();
     };
-    Sse::new(views(&live, page)).keep_alive(KeepAlive::default()).into_response()
+    ([(header::CONTENT_TYPE, "text/event-stream")], Body::from_stream(views(live, page))).into_response()
 }
 
-/// The latest view after each change, at most once per [`PERIOD`]; `held` is released when the page is closed.
-fn views<H>(live: &Live, held: H) -> impl Stream<Item = Result<Event, Infallible>> + use<H> {
-    let mut view = live.view();
-    view.mark_changed();
-    stream::unfold((view, Instant::now(), held), |(mut view, next, held)| async move {
-        sleep_until(next).await;
-        view.changed().await.ok()?;
-        let event = Event::default().data(view.borrow_and_update().json().to_string());
-        Some((Ok(event), (view, Instant::now() + PERIOD, held)))
+/// Server-sent events: the whole board first, then what follows. `held` is released when the page is closed.
+fn views<H>(live: Live, held: H) -> impl Stream<Item = Result<Bytes, Infallible>> + use<H> {
+    let (first, rest) = live.join();
+    stream::unfold((Some(first), rest, live, held), |(first, mut rest, live, held)| async move {
+        let message = match first {
+            Some(first) => first,
+            None => next(&mut rest, &live).await?,
+        };
+        Some((Ok(message), (None, rest, live, held)))
     })
+}
+
+/// The next message. A page that was too slow gets the whole board.
+async fn next(rest: &mut broadcast::Receiver<Bytes>, live: &Live) -> Option<Bytes> {
+    match rest.recv().await {
+        Ok(message) => Some(message),
+        Err(RecvError::Lagged(_)) => Some(live.whole()),
+        Err(RecvError::Closed) => None,
+    }
+}
+
+async fn history(State(Shared { live, .. }): State<Shared>) -> Response {
+    ([(header::CONTENT_TYPE, "application/octet-stream")], live.history()).into_response()
 }
 
 /// A stop, which needs neither the token nor the lease.
@@ -99,27 +112,76 @@ async fn stop(State(Shared { live, .. }): State<Shared>) -> Response {
     }
 }
 
+/// A new zero for all viewers.
+async fn zero(State(Shared { live, token, .. }): State<Shared>, headers: HeaderMap) -> Response {
+    if let Some(refusal) = without_token(&token, &headers) {
+        return refusal;
+    }
+    match live.take_zero() {
+        Ok(()) => StatusCode::NO_CONTENT.into_response(),
+        Err(error) => (StatusCode::CONFLICT, error).into_response(),
+    }
+}
+
+/// The experiments with their parameters. It costs the service a process for each, and so wants the token.
+async fn experiments(State(Shared { live, token, .. }): State<Shared>, headers: HeaderMap) -> Response {
+    if let Some(refusal) = without_token(&token, &headers) {
+        return refusal;
+    }
+    answer(live.ask(Question::Experiments).await)
+}
+
+/// A dry run.
+async fn plan(State(Shared { live, token, .. }): State<Shared>, headers: HeaderMap, body: Bytes) -> Response {
+    if let Some(refusal) = without_token(&token, &headers) {
+        return refusal;
+    }
+    match Question::plan(&body) {
+        Ok(question) => answer(live.ask(question).await),
+        Err(error) => (StatusCode::BAD_REQUEST, error).into_response(),
+    }
+}
+
 /// A command that needs the lease: 401 without the token, 423 if another client holds the lease.
 async fn command(
     State(Shared { live, token, .. }): State<Shared>,
     Path(name): Path<String>,
     headers: HeaderMap,
+    body: Bytes,
 ) -> Response {
-    let command = match name.as_str() {
-        "pause" => Command::Pause,
-        "resume" => Command::Resume,
-        "reset" => Command::Reset,
-        _ => return StatusCode::NOT_FOUND.into_response(),
-    };
-    if !headers.get(TOKEN).is_some_and(|given| token.is(given.as_bytes())) {
-        let error =
-            "this page has no token: open the address with the token that tactus-web names at its start";
-        return (StatusCode::UNAUTHORIZED, error).into_response();
+    let Some(order) = Order::of(&name, &body) else { return StatusCode::NOT_FOUND.into_response() };
+    if let Some(refusal) = without_token(&token, &headers) {
+        return refusal;
     }
+    let order = match order {
+        Ok(order) => order,
+        Err(error) => return (StatusCode::BAD_REQUEST, error).into_response(),
+    };
     let take_over = headers.get(TAKE_OVER).and_then(|reason| reason.to_str().ok());
-    match live.command(command, take_over).await {
-        Ok(()) => StatusCode::NO_CONTENT.into_response(),
-        Err(NotDone::Held(error)) => (StatusCode::LOCKED, error).into_response(),
-        Err(NotDone::Failed(error)) => (StatusCode::CONFLICT, error).into_response(),
+    match live.command(order, take_over).await {
+        Ok(note) if note.is_empty() => StatusCode::NO_CONTENT.into_response(),
+        Ok(note) => note.into_response(),
+        Err(refusal) => refused(refusal),
+    }
+}
+
+/// The refusal of a request without the token.
+fn without_token(token: &Token, headers: &HeaderMap) -> Option<Response> {
+    let is_right = headers.get(TOKEN).is_some_and(|given| token.is(given.as_bytes()));
+    let error = "this page has no token: open the address with the token that tactus-web names at its start";
+    (!is_right).then(|| (StatusCode::UNAUTHORIZED, error).into_response())
+}
+
+fn answer(answer: Result<Value, NotDone>) -> Response {
+    match answer {
+        Ok(value) => ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response(),
+        Err(refusal) => refused(refusal),
+    }
+}
+
+fn refused(refusal: NotDone) -> Response {
+    match refusal {
+        NotDone::Held(error) => (StatusCode::LOCKED, error).into_response(),
+        NotDone::Failed(error) => (StatusCode::CONFLICT, error).into_response(),
     }
 }

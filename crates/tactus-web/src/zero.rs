@@ -1,0 +1,116 @@
+//! The zero that every viewer sees rises against.
+
+use serde_json::{Value, json};
+use tactus_schema::pb::{self, run_event::Event};
+
+/// Frames that a zero taken here averages: half a second at 30 Hz.
+pub(crate) const TAKEN_FRAMES: usize = 15;
+
+/// Where a zero comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Source {
+    /// The rig file's `baseline_counts`: nothing was measured yet.
+    RigFile,
+    /// The reading at rest that a run takes before anything else.
+    Reference,
+    /// A run's `tare()`.
+    Tare,
+    /// Somebody asked for it here, with the tip up and no run in progress.
+    Taken,
+}
+
+/// A zero that was measured.
+#[derive(Debug, Clone, PartialEq)]
+struct Measured {
+    source: Source,
+    counts: Vec<f32>,
+    /// Empty if it was taken here.
+    run_id: String,
+    t_wall_ns: i64,
+}
+
+/// The zero in force. A run's own zero replaces any other; a sensor that connects anew voids what was measured.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Zero {
+    rig_file: Vec<f32>,
+    measured: Option<Measured>,
+}
+
+impl Source {
+    const fn word(self) -> &'static str {
+        match self {
+            Self::RigFile => "rig file",
+            Self::Reference => "reference",
+            Self::Tare => "tare",
+            Self::Taken => "taken here",
+        }
+    }
+}
+
+impl Zero {
+    /// Takes up the rig file's baseline.
+    #[expect(clippy::cast_possible_truncation, reason = "counts need no more than a float's digits")]
+    pub(crate) fn describe(&mut self, description: &pb::RigDescription) {
+        self.rig_file = description.baseline_counts.iter().map(|&counts| counts as f32).collect();
+    }
+
+    /// Takes up the zero that a run has measured, if the event tells one.
+    pub(crate) fn on_event(&mut self, event: &pb::RunEvent) {
+        let (source, counts) = match &event.event {
+            Some(Event::ReferenceDone(done)) => (Source::Reference, &done.mean_counts),
+            Some(Event::TareDone(done)) => (Source::Tare, &done.baseline_counts),
+            Some(_) | None => return,
+        };
+        self.measured = Some(Measured {
+            source,
+            counts: counts.clone(),
+            run_id: event.run_id.clone(),
+            t_wall_ns: event.t_wall_ns,
+        });
+    }
+
+    /// Takes the mean of frames as the zero.
+    pub(crate) fn take(&mut self, counts: Vec<f32>, last: &pb::Frame) {
+        self.measured = Some(Measured {
+            source: Source::Taken,
+            counts,
+            run_id: String::new(),
+            t_wall_ns: last.t_wall_ns,
+        });
+    }
+
+    /// Looks at a frame: the zeros of a sensor that connected anew, or of a service that `has_restarted`, may be others. True if a
+    /// zero is void now.
+    pub(crate) fn on_frame(&mut self, frame: &pb::Frame, has_restarted: bool) -> bool {
+        let is_new = has_restarted || frame.flags & pb::FrameFlag::NewEpoch as u32 != 0;
+        // A zero that is younger than the frame was told before it.
+        let is_void = is_new && self.measured.as_ref().is_some_and(|zero| zero.t_wall_ns < frame.t_wall_ns);
+        if is_void {
+            self.measured = None;
+        }
+        is_void
+    }
+
+    /// JSON for the page; null if there is no zero at all.
+    pub(crate) fn json(&self) -> Value {
+        match &self.measured {
+            Some(zero) => json!({
+                "counts": zero.counts,
+                "source": zero.source.word(),
+                "run_id": zero.run_id,
+                "t_wall_ms": zero.t_wall_ns / 1_000_000,
+            }),
+            None if self.rig_file.is_empty() => Value::Null,
+            None => json!({
+                "counts": self.rig_file,
+                "source": Source::RigFile.word(),
+                "run_id": "",
+                "t_wall_ms": null,
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "zero_tests.rs"]
+mod tests;
