@@ -23,14 +23,15 @@ def browser():
         browser.close()
 
 
-@pytest.fixture
-def lab(tmp_path):
-    lab = Lab(tmp_path)
+@pytest.fixture(scope="session")
+def lab(tmp_path_factory):
+    """One lab for all tests: homing takes most of a test's time. A test leaves it without a run and without a fault."""
+    lab = Lab(tmp_path_factory.mktemp("lab"))
     yield lab
     lab.close()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def web(lab):
     """The address of the dashboard."""
     process = lab.start("tactus-web", "--endpoint", lab.endpoint, "--listen", "127.0.0.1:0")

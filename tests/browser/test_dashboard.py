@@ -47,9 +47,16 @@ def test_a_run_is_watched_and_stopped(lab, dashboard):
     expect(page.locator("#fault")).to_have_count(0)
     expect(page.locator("#stage")).to_contain_text("idle")
     expect(page.locator("#lease")).to_have_text("nobody")
+    # Buttons are enabled when they mean something.
+    for name in ("#pause", "#resume"):
+        expect(page.locator(name)).to_be_disabled()
+    for name in ("#reset", "#stop", "#take-zero"):
+        expect(page.locator(name)).to_be_enabled()
     page.keep("idle")
 
     client = start_hold(lab, page)
+    for name in ("#resume", "#reset", "#take-zero", "#go"):
+        expect(page.locator(name)).to_be_disabled()
     # At this depth many elements respond; the brightest is below the tip.
     greatest = page.locator("#array").get_attribute("aria-label")
     assert re.search("at element (19|20|11|12)$", greatest), greatest
@@ -72,14 +79,17 @@ def test_a_run_is_watched_and_stopped(lab, dashboard):
     expect(page.locator("#log")).to_contain_text("STOP by dashboard: button")
     assert "stopped by dashboard" in client.wait_for("exit_status")
     client.end()
+    for name in ("#pause", "#resume"):
+        expect(page.locator(name)).to_be_disabled()
+    expect(page.locator("#reset")).to_be_enabled()
     page.keep("stopped")
 
 
 @pytest.mark.parametrize(("width", "height"), [(1400, 900), (820, 1100), (390, 844), (844, 390)])
-def test_stop_is_in_view_wherever_the_page_is_scrolled_to(lab, dashboard, width, height):
+def test_stop_is_in_view_wherever_the_page_is_scrolled_to(dashboard, width, height):
     page = loaded(dashboard)
     page.set_viewport_size({"width": width, "height": height})
-    page.select_option("#experiment", "grid-sweep")
+    # While the page asks something, too.
     page.locator("#reset").click()
     expect(page.locator("#sure")).to_be_visible()
     for to in (0, 0.25, 0.5, 0.75, 1):
@@ -98,7 +108,6 @@ def test_stop_is_in_view_wherever_the_page_is_scrolled_to(lab, dashboard, width,
         assert seen["inside"] and seen["hit"] == "stop" and seen["high"] >= 40, (to, seen)
         assert seen["wide"], "nothing is wider than the window"
     page.keep(f"scrolled-{width}")
-    # It is clicked while the page asks something else.
     page.locator("#stop").click()
     expect(page.locator("#stopped")).to_have_text("stop: done")
 
@@ -116,22 +125,6 @@ def test_stop_has_a_key_and_a_reset_asks_for_confirmation(lab, dashboard):
     page.keyboard.press("s")
     page.get_by_role("button", name="Yes, reset").click()
     expect(page.locator("#answer")).to_have_text("reset: done", timeout=PATIENCE_MS)
-
-
-def test_buttons_are_enabled_only_when_they_mean_something(lab, dashboard):
-    page = loaded(dashboard)
-    for name in ("#pause", "#resume"):
-        expect(page.locator(name)).to_be_disabled()
-    for name in ("#reset", "#stop", "#take-zero"):
-        expect(page.locator(name)).to_be_enabled()
-    client = start_hold(lab, page)
-    expect(page.locator("#pause")).to_be_enabled()
-    for name in ("#resume", "#reset", "#take-zero", "#go"):
-        expect(page.locator(name)).to_be_disabled()
-    end_hold(page, client)
-    for name in ("#pause", "#resume"):
-        expect(page.locator(name)).to_be_disabled()
-    expect(page.locator("#reset")).to_be_enabled()
 
 
 def test_a_page_without_the_token_looks_and_stops(lab, dashboard):
@@ -243,26 +236,6 @@ def test_an_experiment_is_chosen_checked_and_started(lab, dashboard):
     expect(page.locator("#log")).to_contain_text("image started by ada s.")
 
 
-def test_a_run_is_paused_and_resumed_and_goes_on_with_another_covering(lab, dashboard):
-    page = loaded(dashboard)
-    page.select_option("#experiment", "image")
-    expect(page.locator("#verdict.possible")).to_be_visible(timeout=PATIENCE_MS)
-    page.locator("#start").click()
-    # This rig is at serial ports: a person changes its covering, and confirms it by its thickness.
-    expect(page.locator("#run")).to_contain_text("2.54 mm covering", timeout=PATIENCE_MS)
-    expect(page.locator("#resume")).to_be_disabled()
-    page.locator("#covering").fill("2.0")
-    page.locator("#resume").click()
-    expect(page.locator("#answer")).to_contain_text("RESUME FAILED")
-    page.locator("#covering").fill("2.54")
-    page.locator("#resume").click()
-    expect(page.locator("#answer")).to_have_text("resume: done")
-    expect(page.locator("#section")).to_have_attribute("aria-label", re.compile("covering 2.54 mm"), timeout=PATIENCE_MS)
-    page.keep("covering")
-    page.locator("#stop").click()
-    expect(page.locator("#run")).to_contain_text("finished: stopped", timeout=PATIENCE_MS)
-
-
 def test_the_tip_is_moved_above_an_element_and_a_step_aside(lab, dashboard):
     page = loaded(dashboard)
     page.locator("#above-element").fill("9")
@@ -322,3 +295,24 @@ def test_stop_works_when_the_rest_of_the_page_does_not(lab, dashboard, open_page
     expect(page.locator("#stopped")).to_have_text("stop: done")
     assert page.errors == ["broken"]
     page.errors.clear()
+
+
+# The last test: it leaves another covering in place.
+def test_a_run_goes_on_with_another_covering_once_it_is_confirmed(lab, dashboard):
+    page = loaded(dashboard)
+    page.select_option("#experiment", "image")
+    expect(page.locator("#verdict.possible")).to_be_visible(timeout=PATIENCE_MS)
+    page.locator("#start").click()
+    # This rig is at serial ports: a person changes its covering, and confirms it by its thickness.
+    expect(page.locator("#run")).to_contain_text("2.54 mm covering", timeout=PATIENCE_MS)
+    expect(page.locator("#resume")).to_be_disabled()
+    page.locator("#covering").fill("2.0")
+    page.locator("#resume").click()
+    expect(page.locator("#answer")).to_contain_text("RESUME FAILED")
+    page.locator("#covering").fill("2.54")
+    page.locator("#resume").click()
+    expect(page.locator("#answer")).to_have_text("resume: done")
+    expect(page.locator("#section")).to_have_attribute("aria-label", re.compile("covering 2.54 mm"), timeout=PATIENCE_MS)
+    page.keep("covering")
+    page.locator("#stop").click()
+    expect(page.locator("#run")).to_contain_text("finished: stopped", timeout=PATIENCE_MS)

@@ -199,9 +199,14 @@ impl Live {
         let client = self.connected().await?;
         let reply = match question {
             Question::Experiments => {
-                let _turn = self.listing.lock().await;
-                let request = pb::CommandRequest { who: WHO.into(), ..Default::default() };
-                client.command(Command::Experiments, &request, DRY_RUN_PATIENCE).await
+                let (client, listing) = (Arc::clone(&client), Arc::clone(&self.listing));
+                // A task of its own: if this page is closed meanwhile, the next one still waits until the service has listed.
+                let listed = tokio::spawn(async move {
+                    let _turn = listing.lock().await;
+                    let request = pb::CommandRequest { who: WHO.into(), ..Default::default() };
+                    client.command(Command::Experiments, &request, DRY_RUN_PATIENCE).await
+                });
+                listed.await.map_err(|error| NotDone::Failed(error.to_string()))?
             }
             Question::Plan(request) => {
                 let request = pb::RunRequest { who: WHO.into(), ..request };
