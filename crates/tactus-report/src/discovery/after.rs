@@ -37,23 +37,27 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
         noise.map(|noise| (rms * rms - noise * noise).max(0.0).sqrt())
     };
     let in_noise = |counts: Option<f64>| counts.zip(noise).map(|(counts, noise)| counts / noise);
-    let rows: [(&str, &dyn Fn(Level) -> Option<f64>); 8] = [
-        ("residual / counts rms", &|level| Some(level.heldout_rms_counts)),
-        ("residual / noise", &|level| in_noise(Some(level.heldout_rms_counts))),
-        ("its variance / counts\u{b2}", &|level| Some(level.heldout_rms_counts.powi(2))),
-        ("its variance / noise\u{b2}", &|level| level.heldout_chi2),
-        ("gap / counts rms", &gap),
-        ("gap / noise", &|level| in_noise(gap(level))),
-        ("structured / noise", &|level| level.structured.map(|part| part.rms_noise)),
-        ("structured at most (95 %) / noise", &|level| level.structured.map(|part| part.upper_noise)),
+    let both = [found.base, found.final_.level];
+    let rows = [
+        ("residual / counts rms", both.map(|level| Some(level.heldout_rms_counts))),
+        ("residual / noise", both.map(|level| in_noise(Some(level.heldout_rms_counts)))),
+        ("its variance / counts\u{b2}", both.map(|level| Some(level.heldout_rms_counts.powi(2)))),
+        ("its variance / noise\u{b2}", both.map(|level| level.heldout_chi2)),
+        ("gap / counts rms", both.map(gap)),
+        ("gap / noise", both.map(|level| in_noise(gap(level)))),
+        ("structured / noise", both.map(|level| level.structured.map(|part| part.rms_noise))),
+        (
+            "structured at most (95 %) / noise",
+            both.map(|level| level.structured.map(|part| part.upper_noise)),
+        ),
     ];
     let mut table = Table::new(&[
         Column::Name("on held-out presses"),
         Column::Number("base model, recalibrated"),
         Column::Number("grown model"),
     ]);
-    for (name, of) in rows {
-        table.row([name.to_owned(), or_dash(of(found.base)), or_dash(of(found.final_.level))]);
+    for (name, [base, grown]) in rows {
+        table.row([name.to_owned(), or_dash(base), or_dash(grown)]);
     }
     writeln!(
         f,
