@@ -151,6 +151,7 @@ def test_all_viewers_see_the_same_zero_and_the_last_minutes(lab, dashboard, open
     # The presses before this page was opened.
     late.wait_for_function("() => import('./lab.js').then(({ lab }) => lab.frames.length > 60 && lab.frames[0].seq < lab.frame.seq - 60)")
     end_hold(page, client)
+    expect(page.locator("#drift")).to_contain_text("at rest now against the zero")
     page.locator("#take-zero").click()
     for each in (page, late):
         expect(each.locator("#zero")).to_contain_text("taken here")

@@ -190,6 +190,15 @@ fn a_page_that_opens_in_mid_press_has_the_runs_zero_and_the_last_minutes() {
     early.until(|known| known["run"]["phase"] == "finished");
     assert_eq!(client.wait().0, Some(1));
     assert_eq!(early.ask("POST /zero", "").0, 401, "what all viewers see changes with the token only");
+    // The zero is the mean of half a second: all of it with the tip up.
+    let up = Cell::new((0, 0));
+    early.until(|known| {
+        let (seq, frames) = up.get();
+        let is_up = known["frame"]["tip_mm"][2].as_f64().is_some_and(|z_mm| z_mm > 1.0);
+        let now = known["frame"]["seq"].as_u64().unwrap_or(0);
+        up.set((now, if is_up { frames + u64::from(now > seq) } else { 0 }));
+        up.get().1 > 20
+    });
     assert_eq!(early.order("/zero", &Value::Null).0, 204);
     let known = early.until(|known| known["zero"]["source"] == "taken here" && known["frame"].is_object());
     assert!(sum_of_rises(&known).abs() < 200.0, "{known}");

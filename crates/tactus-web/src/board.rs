@@ -122,9 +122,10 @@ impl Board {
             return Err("a run is in progress: its script takes the zero".into());
         }
         let is_up = |stage: &pb::StageState| stage.status() == pb::StageStatus::Idle && stage.z_mm > 0.0;
-        if !self.stage.as_ref().is_some_and(is_up) {
+        let was_up = self.history.lowest_z_mm(TAKEN_FRAMES).is_some_and(|z_mm| z_mm > 0.0);
+        if !was_up || !self.stage.as_ref().is_some_and(is_up) {
             return Err(
-                "the tip is not known to be above the covering: a zero under load would be wrong".into()
+                "the tip was not above the covering for the last half second, or that is not known".into()
             );
         }
         let mean = self.history.mean(TAKEN_FRAMES);

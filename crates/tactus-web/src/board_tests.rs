@@ -42,6 +42,13 @@ fn the_zero_of_a_page_that_opens_in_mid_press_is_the_runs_zero() {
 fn a_zero_is_taken_at_rest_only() {
     let mut board = at_rest();
     board.take_zero().unwrap();
+    // The tip has just come up: the last half second still has a frame of the press.
+    let mut pressed = at_rest();
+    pressed.stage = Some(stage(pb::StageStatus::Idle, -0.2));
+    pressed.on_frame(frame(31, 2_000.0), 0);
+    pressed.stage = Some(stage(pb::StageStatus::Idle, 2.0));
+    pressed.on_frame(frame(32, 100.0), 0);
+    assert!(pressed.take_zero().unwrap_err().contains("above the covering"));
     assert_eq!(board.rig_json()["zero"]["source"], "taken here");
     board.stage = Some(stage(pb::StageStatus::Idle, -0.2));
     assert!(board.take_zero().unwrap_err().contains("above the covering"));

@@ -87,6 +87,13 @@ impl History {
         Some(sums.into_iter().map(mean).collect())
     }
 
+    /// Where the tip was lowest in the last `frames` frames, z in mm; `None` if that is not known of each.
+    pub(crate) fn lowest_z_mm(&self, frames: usize) -> Option<f32> {
+        let from = self.moments.len().checked_sub(frames)?;
+        let heights = self.moments.range(from..).map(|moment| moment.tip_mm[2]);
+        heights.map(|z_mm| Some(z_mm).filter(|z_mm| z_mm.is_finite())).reduce(|a, b| Some(a?.min(b?)))?
+    }
+
     /// All frames for the page, least significant byte first: the number of elements and of frames as `u32`; then for each frame its
     /// number and its time in s as `f64`, x, y and z of the tip in mm and the frames lost before it as `f32`, and its counts as `f32`.
     /// A place of the tip that is not known is NaN.

@@ -49,6 +49,21 @@ fn a_mean_is_over_frames_without_a_gap() {
 }
 
 #[test]
+fn the_lowest_place_of_the_tip_is_known_if_each_is() {
+    let at = |z_mm| pb::StageState { z_mm, ..Default::default() };
+    let mut history = of(0..2);
+    assert_eq!(history.lowest_z_mm(1), None, "it is not known where the tip was");
+    for (seq, z_mm) in [(2, -0.5), (3, 2.0), (4, 1.5)] {
+        history.push(&frame(seq, &[0.0, 0.0]), Some(&at(z_mm)));
+    }
+    assert_eq!(history.lowest_z_mm(2), Some(1.5));
+    assert_eq!(history.lowest_z_mm(3), Some(-0.5));
+    assert_eq!(history.lowest_z_mm(4), None);
+    assert_eq!(history.lowest_z_mm(9), None);
+    assert_eq!(history.lowest_z_mm(0), None);
+}
+
+#[test]
 fn the_page_gets_numbers_in_a_fixed_order() {
     let mut history = History::default();
     let stage = pb::StageState { x_mm: 1.0, y_mm: 2.0, z_mm: -0.5, ..Default::default() };
