@@ -162,10 +162,14 @@ def test_safety_news_of_a_run_that_is_over_is_marked_as_past(lab, dashboard):
     page = loaded(dashboard)
     client = start_hold(lab, page)
     # The sensor is silent while the tip is in contact: the supervisor stops the stage, and the run repeats the press.
-    lab.mock.tell("sensor stall 1s")
+    lab.mock.tell("sensor stall 2s")
     expect(page.locator("#safety.now")).to_contain_text("silence", timeout=PATIENCE_MS)
     expect(page.locator("#log tr.stop").first).to_be_visible()
     page.keep("safety-now")
+    # Until the press is repeated the fault holds, and a stop would leave it for a reset.
+    expect(page.locator("#zero")).to_contain_text("reference of", timeout=PATIENCE_MS)
+    expect(page.locator("#depth")).to_have_text("0.400", timeout=PATIENCE_MS)
+    expect(page.locator("#fault")).to_have_count(0)
     end_hold(page, client)
     expect(page.locator("#safety.past")).to_contain_text(re.compile("^past, .*, run .*-hold-.*silence"))
     expect(page.locator("#safety.now")).to_have_count(0)
