@@ -16,7 +16,7 @@ mod time;
 
 pub use draft::{DraftFile, DraftFileError};
 pub use frame::{Frame, FrameFlags};
-pub use message::{Message, pb};
+pub use message::{Message, pb, with_message};
 pub use model::{Model, ModelFileError};
 pub use rig::{Rig, RigError};
 pub use time::{DeviceTick, MonoTime, TimeStamp, WallTime};

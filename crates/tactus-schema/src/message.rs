@@ -86,6 +86,17 @@ words! {
     }
 }
 
+/// A state of a run and its message, which may begin with the state itself.
+pub fn with_message(word: &str, message: &str) -> String {
+    if message.is_empty() {
+        word.to_owned()
+    } else if message.starts_with(word) {
+        message.to_owned()
+    } else {
+        format!("{word}: {message}")
+    }
+}
+
 #[cfg(test)]
 #[path = "message_tests.rs"]
 mod tests;

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use serde_json::{Value, json};
 use tactus_schema::pb::{self, run_event::Event};
+use tactus_schema::with_message;
 
 /// Entries that are kept; the oldest are dropped.
 const ENTRIES_MAX: usize = 400;
@@ -183,7 +184,7 @@ fn in_words(event: &Event) -> Option<(Weight, String)> {
         Event::Cleanup(e) if e.retracted => note(format!("tip retracted to z {:.3} mm", e.z_mm)),
         Event::Cleanup(e) => stop(format!("TIP NOT RETRACTED, z {:.3} mm: {}", e.z_mm, e.detail)),
         Event::Finished(e) => {
-            let text = format!("ended: {} {}", e.exit_status().word(), e.message);
+            let text = format!("ended: {}", with_message(e.exit_status().word(), &e.message));
             match e.exit_status() {
                 pb::ExitStatus::Done => note(text),
                 pb::ExitStatus::Degraded => warning(text),

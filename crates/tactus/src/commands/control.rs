@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use tactus_schema::key::Command;
-use tactus_schema::pb;
+use tactus_schema::{pb, with_message};
 
 use crate::cli::{Common, LeaseArgs, ResumeArgs, StopArgs};
 use crate::connection::{self, PATIENCE};
@@ -210,17 +210,6 @@ fn print(reply: &pb::CommandReply) {
         ("service", format!("version {}, up {}", reply.version, duration(health.uptime_s))),
     ]);
     print_fields(&fields);
-}
-
-/// A state of a run and its message, which may begin with the state itself.
-pub(crate) fn with_message(word: &str, message: &str) -> String {
-    if message.is_empty() {
-        word.to_owned()
-    } else if message.starts_with(word) {
-        message.to_owned()
-    } else {
-        format!("{word}: {message}")
-    }
 }
 
 /// The limit of depth, and what the safety supervisor did last.

@@ -9,10 +9,9 @@ use anyhow::Context;
 use serde_json::json;
 use tactus_plan::{Arguments, Script};
 use tactus_runner::experiments::{self, ExperimentError};
-use tactus_schema::pb;
+use tactus_schema::{pb, with_message};
 
 use crate::cli::{Common, RunArgs};
-use crate::commands::control::with_message;
 use crate::connection;
 use crate::exit::{Exit, Failure, at_source, in_words};
 use crate::output::{duration, print_fields, say};
