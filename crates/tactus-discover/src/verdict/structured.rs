@@ -91,6 +91,11 @@ impl Readings<'_> {
         error.hypot((2.0 / self.freedom).sqrt() * (1.0 + value))
     }
 
+    /// The residual at a place in this unit, if it is among those that are examined.
+    fn value(&self, place: usize, unit: f64, among: impl Fn(usize) -> bool) -> Option<f64> {
+        among(place).then(|| f64::from(self.residual[place]) / unit)
+    }
+
     /// Lags at which hardly anything of the noise is left, of which each shows what lasts: for this many frames of memory.
     pub(super) const fn late(lag: usize) -> RangeInclusive<usize> {
         3 * lag..=9 * lag
@@ -102,10 +107,7 @@ impl Readings<'_> {
         let elements = self.noise_counts.iter().zip(self.unit_counts).enumerate();
         for (element, (noise, unit)) in elements.filter(|(_, (noise, _))| noise.is_finite()) {
             let own = self.late_correlation * (noise / unit).powi(2);
-            let value = |frame: usize| {
-                let place = frame * self.elements + element;
-                among(place).then(|| f64::from(self.residual[place]) / unit)
-            };
+            let value = |frame: usize| self.value(frame * self.elements + element, *unit, &among);
             let values: Vec<Option<f64>> = press.clone().map(value).collect();
             for lag in Self::late(self.lag) {
                 let pairs = values.iter().zip(values.iter().skip(lag));
@@ -124,10 +126,7 @@ impl Readings<'_> {
         let elements = self.noise_counts.iter().zip(self.unit_counts).enumerate();
         for (element, (noise, unit)) in elements.filter(|(_, (noise, _))| noise.is_finite()) {
             let variance = (noise / unit).powi(2);
-            let value = |frame: usize| {
-                let place = frame * self.elements + element;
-                among(place).then(|| f64::from(self.residual[place]) / unit)
-            };
+            let value = |frame: usize| self.value(frame * self.elements + element, *unit, &among);
             for frame in press.clone() {
                 let Some(now) = value(frame) else { continue };
                 all[0] += now * now - variance;

@@ -96,9 +96,9 @@ fn the_top_level_declares_and_does_nothing() {
         problem("A = param('a', default = [])\ndef run(rig):\n    pass\n"),
         "bad.star:1:5: a parameter's default list needs at least one value"
     );
-    assert!(problem("def run(rig):\n    pass\nrun = 3\n").starts_with("bad.star:1"));
+    assert!(problem("def run(rig):\n    pass\nrun = 3\n").starts_with("bad.star:1:"));
     assert!(
-        problem("def run():\n    pass\n").starts_with("bad.star:1"),
+        problem("def run():\n    pass\n").starts_with("bad.star:1:"),
         "{}",
         problem("def run():\n    pass\n")
     );

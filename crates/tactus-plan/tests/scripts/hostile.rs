@@ -112,7 +112,7 @@ fn what_reaches_around_the_bounds_does_not_exist() {
         ["getattr", "hasattr", "dir", "print", "repr", "load", "open", "eval", "exec", "breakpoint", "debug"]
     {
         let error = end_of(&format!("x = {name}(1)")).unwrap_err();
-        assert!(error.to_string().starts_with("hostile.star:2"), "{name}: {error}");
+        assert!(error.to_string().starts_with("hostile.star:2:"), "{name}: {error}");
     }
 }
 

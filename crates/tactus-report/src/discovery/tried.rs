@@ -4,7 +4,7 @@ use std::fmt;
 
 use tactus_discover::{Discovery, Round, TriedEffect};
 
-use super::words::{list, percent};
+use super::words::{list, percent, would_close};
 use crate::{
     document::{Column, Table},
     markup::Text,
@@ -38,9 +38,7 @@ fn given_up(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     }
     writeln!(f, "<h3>Given up</h3>\n<ul>")?;
     for one in &found.given_up {
-        let tried = found.rounds.iter().flat_map(|round| &round.candidates);
-        let of_it = tried.filter(|tried| tried.effect == one.effect).filter_map(|tried| tried.shrink);
-        let closes = of_it.reduce(f64::max).map_or_else(String::new, |share| {
+        let closes = would_close(found, one).map_or_else(String::new, |share| {
             format!(", though it would close {} of the gap", percent(share))
         });
         writeln!(f, "<li>{}{closes}: {}.</li>", Text(one.effect), Text(one.in_words()))?;

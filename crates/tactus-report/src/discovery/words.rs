@@ -134,13 +134,15 @@ fn left(found: &Discovery) -> String {
     }
 }
 
+/// The share of the gap that an effect which was given up would close: the greatest of the rounds that fitted it.
+pub(super) fn would_close(found: &Discovery, one: &GivenUp) -> Option<f64> {
+    let tried = found.rounds.iter().flat_map(|round| &round.candidates);
+    tried.filter(|tried| tried.effect == one.effect).filter_map(|tried| tried.shrink).reduce(f64::max)
+}
+
 /// The effect that was given up although it would close most of the gap, if one would close much.
 fn nearest(found: &Discovery) -> String {
-    let closes = |one: &GivenUp| {
-        let tried = found.rounds.iter().flat_map(|round| &round.candidates);
-        tried.filter(|tried| tried.effect == one.effect).filter_map(|tried| tried.shrink).reduce(f64::max)
-    };
-    let known = found.given_up.iter().filter_map(|one| Some((one, closes(one)?)));
+    let known = found.given_up.iter().filter_map(|one| Some((one, would_close(found, one)?)));
     known.filter(|(_, share)| *share >= CLOSES_MUCH).max_by(|a, b| a.1.total_cmp(&b.1)).map_or_else(
         String::new,
         |(one, share)| {
