@@ -34,7 +34,7 @@ pub struct Ablation {
     pub outside_named: Rate,
     /// Drafts of what no effect explains.
     pub drafts: DraftScores,
-    /// Shrink on held-out presses of all depths, where the gap is known within a tenth.
+    /// Shrink on held-out presses of all depths, where it is known within a tenth.
     pub shrink: Shrink,
     /// Shrink on presses deeper than any fitted one, on the same sets.
     pub deeper_shrink: Shrink,
@@ -68,7 +68,7 @@ impl Ablation {
     fn new(method: String, outcomes: &[Outcome]) -> Self {
         let of = |campaign: Campaign| outcomes.iter().filter(move |set| set.campaign == campaign);
         let separate = || of(Campaign::Names).filter(|set| set.z() >= Z_SEPARATE - 0.5);
-        let known = || separate().filter(|set| set.gap_error <= SHRINK_ERROR_MAX);
+        let known = || separate().filter(|set| set.shrink_error <= SHRINK_ERROR_MAX);
         Self {
             method,
             false_alarms: Rate::of(of(Campaign::FalseAlarms), |set| set.is_detected() || set.has_failed()),

@@ -32,8 +32,8 @@ pub struct Outcome {
     pub shrink: Option<f64>,
     /// The same on presses deeper than any fitted one, if the method reports it.
     pub deeper_shrink: Option<f64>,
-    /// Relative standard error of the gap itself.
-    pub gap_error: f64,
+    /// Standard error of the shrink, as the report gives it; without it, the relative one of the gap.
+    pub shrink_error: f64,
     /// Shrink of the first hidden effect, fitted alone in the first round; `None` if it was not fitted.
     pub alone_shrink: Option<f64>,
     /// The draft of what is left, if there is one.
@@ -113,9 +113,9 @@ impl Outcome {
         Some(self.known_shrink()? / own.filter(|own| *own > 0.0)?)
     }
 
-    /// The shrink if the gap is known within a tenth; 0 without a report.
+    /// The shrink if it is known within a tenth; 0 without a report.
     pub fn known_shrink(&self) -> Option<f64> {
-        if self.has_failed() { Some(0.0) } else { self.shrink.filter(|_| self.gap_error <= SHRINK_ERROR_MAX) }
+        if self.has_failed() { Some(0.0) } else { self.shrink.filter(|_| self.shrink_error <= SHRINK_ERROR_MAX) }
     }
 
     /// True if a hidden physics is a point of the library's own parameters.
@@ -204,6 +204,7 @@ struct Candidate {
 #[derive(Debug, Deserialize)]
 struct Last {
     shrink: Option<f64>,
+    shrink_se: Option<f64>,
     deeper_shrink: Option<f64>,
 }
 
@@ -248,9 +249,9 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryRepo
         noise: [label.noise.rms_counts, label.noise.phi],
         shrink: report.as_ref().and_then(|report| report.last.shrink),
         deeper_shrink: report.as_ref().and_then(|report| report.last.deeper_shrink),
-        gap_error: report
-            .as_ref()
-            .map_or(f64::INFINITY, |report| gap_error(report, readings, label.noise.phi)),
+        shrink_error: report.as_ref().map_or(f64::INFINITY, |report| {
+            report.last.shrink_se.unwrap_or_else(|| gap_error(report, readings, label.noise.phi))
+        }),
         alone_shrink,
         taken: report
             .iter()

@@ -31,7 +31,7 @@ pub(crate) fn set(truths: &[Option<&str>], names: &[(&str, &[&str])], verdict: &
         verdict: verdict.into(),
         shrink: Some(0.9),
         deeper_shrink: None,
-        gap_error: 0.01,
+        shrink_error: 0.01,
         alone_shrink: None,
         draft: None,
         seconds: 1.0,
@@ -125,7 +125,11 @@ fn labels_and_reports_are_read_from_files() -> Result<()> {
     // 48,000 readings held out, a gap of half the noise's power.
     let phi = label.noise.phi;
     let error = (2.0 * (1.0 + phi * phi) / (48_000.0 * (1.0 - phi * phi))).sqrt() / 0.5;
-    assert!((outcome.gap_error - error).abs() < 1e-12);
+    assert!((outcome.shrink_error - error).abs() < 1e-12);
+    let report = report.to_string().replace("\"shrink\":0.9", "\"shrink\":0.9,\"shrink_se\":0.03");
+    fs::write(places.report(&id), report)?;
+    let set = Planned { id: id.clone(), campaign: Campaign::Names, recipe: Recipe::new(3) };
+    assert!((read(&[set], &places)?[0].shrink_error - 0.03).abs() < 1e-12);
 
     fs::remove_file(places.report(&id))?;
     let set = Planned { id, campaign: Campaign::Names, recipe: Recipe::new(3) };
@@ -141,7 +145,7 @@ fn a_shrink_is_over_that_of_the_own_fit_without_noise() {
     right.truths[0].own_shrink = Some(0.9);
     assert!(right.shrink_to_own_fit().is_some_and(|shrink| (shrink - 1.0).abs() < 1e-12));
     assert_eq!(Outcome { verdict: "failed".into(), ..right.clone() }.shrink_to_own_fit(), Some(0.0));
-    assert_eq!(Outcome { gap_error: 0.2, ..right }.shrink_to_own_fit(), None);
+    assert_eq!(Outcome { shrink_error: 0.2, ..right }.shrink_to_own_fit(), None);
 }
 
 #[test]

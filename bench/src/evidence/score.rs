@@ -19,7 +19,7 @@ pub const Z_NAMEABLE: f64 = 5.0;
 pub const ORACLE_LEVEL: f64 = 0.028;
 /// The `1 - ORACLE_LEVEL` quantile of the normal distribution.
 const ORACLE_QUANTILE: f64 = 1.911;
-/// Greatest relative error of a gap whose shrink counts.
+/// Greatest standard error of a shrink that counts.
 pub(super) const SHRINK_ERROR_MAX: f64 = 0.1;
 /// Ranges of separation after the spread is fitted too.
 const BANDS: [(&str, [f64; 2]); 5] = [
@@ -107,7 +107,7 @@ pub struct Band {
     pub set_size: SetSize,
     /// A named effect is neither hidden nor equivalent to a hidden one; of all sets.
     pub wrong: Rate,
-    /// Shrink of the sets in which the gap is known within a tenth, whatever was named.
+    /// Shrink of the sets in which it is known within a tenth, whatever was named.
     pub shrink: Shrink,
     /// The same over the shrink of the true effect, fitted alone; without noise where that is computed.
     pub shrink_to_own_fit: Shrink,
@@ -173,7 +173,7 @@ pub struct Several {
     pub recall: Rate,
     /// Names that are hidden effects; of all names.
     pub precision: Rate,
-    /// Shrink of the sets in which the gap is known within a tenth.
+    /// Shrink of the sets in which it is known within a tenth.
     pub shrink: Shrink,
 }
 

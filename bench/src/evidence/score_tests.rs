@@ -49,7 +49,7 @@ fn names_count_among_all_sets_also_where_nothing_was_detected() {
 #[test]
 fn a_shrink_counts_only_where_the_gap_is_known() {
     let known = set(&[Some("backlash")], &[("backlash", &[])], "explained");
-    let unknown = Outcome { shrink: Some(-3.0), gap_error: 0.4, ..known.clone() };
+    let unknown = Outcome { shrink: Some(-3.0), shrink_error: 0.4, ..known.clone() };
     let own = Outcome { alone_shrink: Some(0.6), named: Vec::new(), ..known.clone() };
     let band = &Scores::new(&[known, unknown, own]).bands[0];
     assert_eq!((band.shrink.of, band.shrink.median), (2, Some(0.9)));

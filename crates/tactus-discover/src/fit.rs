@@ -26,7 +26,7 @@ mod random_walk;
 mod scale;
 mod sums;
 
-pub(crate) use folds::gains_by_folds;
+pub(crate) use folds::{FoldsOf, gains_by_folds};
 pub(crate) use grams::Grams;
 pub(crate) use heldout::LOUD;
 pub(crate) use knots::{hat, of_formulas, places, table_places};

@@ -66,7 +66,13 @@ fn the_defaults_are_the_scripts_own() {
 const CLEAR_Z: f64 = 8.0;
 
 fn noise() -> Noise {
-    Noise { rms_counts: 2.0, by_element_counts: vec![2.0; 48], correlation: vec![1.0], rounding_share: 0.0 }
+    Noise {
+        rms_counts: 2.0,
+        by_element_counts: vec![2.0; 48],
+        correlation: vec![1.0],
+        rounding_share: 0.0,
+        repeated_frames: 1.0,
+    }
 }
 
 fn explanation(known: &Known, name: &'static str, values: &[(&str, f64)]) -> Explanation {

@@ -3,17 +3,12 @@
 //! A model's residual on held-out presses is noise and structure. [`structured`] bounds the structure from above, in units of the noise.
 //! The verdict depends on four things: whether effects were added, whether a test rejects the base model, whether one rejects the grown
 //! model, and that bound ([`conclude()`]). One of the tests is of the noise ([`own_noise`]): whether elements share it, and single readings.
-//! How much of the gap is closed is
-//!
-//! ```text
-//! shrink = (MSE_base - MSE_grown) / (MSE_base - noise^2)        mean squares of the residual on held-out presses
-//! ```
+//! How much of the gap is closed, which may be far below the noise, is measured so that the noise cancels ([`closed`]).
 //!
 //! An added effect must be confirmed: fitted presses that its parameters have not seen, by five folds, must be nearer to the model with it than
 //! to the model without. The held-out presses are opened for the figures alone.
 //!
-//! Where the verdict leaves something unexplained, it is drafted ([`drafting`]). How much a draft closes of what is left, which may be far below
-//! the noise, is measured so that the noise cancels ([`closed`]). The report is a [`Discovery`].
+//! Where the verdict leaves something unexplained, it is drafted ([`drafting`]). The report is a [`Discovery`].
 
 mod closed;
 mod conclude;

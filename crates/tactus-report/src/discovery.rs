@@ -174,7 +174,7 @@ fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
         ("residual before / counts", level(found.base.heldout_rms_counts)),
         ("residual after / counts", level(found.final_.level.heldout_rms_counts)),
         ("structured / noise, 95 % bound", structured),
-        ("gap closed", found.final_.shrink.map_or_else(|| "\u{2013}".into(), words::percent)),
+        ("gap closed", found.final_.closed.map_or_else(|| "\u{2013}".into(), closed)),
         (
             "presses fitted",
             format!(

@@ -53,6 +53,8 @@ pub(crate) struct Noise {
     pub(crate) correlation: Vec<f64>,
     /// Share of a reading's variance that comes from rounding and repeats for the same signal, so averaging does not reduce it.
     pub(crate) rounding_share: f64,
+    /// For how many readings a signal repeats, in the mean over the readings in contact: where the tip rests.
+    pub(crate) repeated_frames: f64,
 }
 
 impl Noise {
@@ -138,6 +140,7 @@ impl Noise {
             by_element_counts: variances.iter().map(|variance| variance.sqrt()).collect(),
             correlation,
             rounding_share,
+            repeated_frames: repeated_frames(frames, still),
         };
         let readings = DIFFERENCES_SHARE * (pairs[longest] * elements) as f64;
         let freedom = readings / noise.squares_inflation(pairs[longest]);
@@ -164,15 +167,17 @@ impl Noise {
             by_element_counts,
             correlation: vec![1.0],
             rounding_share: 0.0,
+            repeated_frames: 1.0,
         }
     }
 
-    /// By how much the variance of a mean of `frames` consecutive readings exceeds that of independent ones.
+    /// By how much the variance of a mean of `frames` consecutive readings exceeds that of independent ones. Rounding repeats for as long
+    /// as the signal does.
     pub(crate) fn inflation(&self, frames: usize) -> f64 {
         let count = frames as f64;
         let pairs = self.correlation.iter().enumerate().skip(1).take(frames.saturating_sub(1));
         let correlated = 1.0 + 2.0 * pairs.map(|(lag, rho)| (1.0 - lag as f64 / count) * rho).sum::<f64>();
-        correlated + (count - 1.0) * self.rounding_share
+        correlated + (count.min(self.repeated_frames) - 1.0).max(0.0) * self.rounding_share
     }
 
     /// By how much the variance of a sum of squares of readings exceeds that of independent ones. This takes the noise to be
@@ -193,6 +198,21 @@ impl Noise {
     pub(crate) fn memory_frames(&self) -> usize {
         memory_frames(&self.correlation)
     }
+}
+
+/// The number of frames of the rest to which a frame in contact belongs, in the mean over such frames; 1 while the tip moves. In the clear an
+/// element's signal does not change at all, and its baseline takes up what rounding does to it.
+pub(super) fn repeated_frames(frames: &Frames, still: &[usize]) -> f64 {
+    let (mut readings, mut squares) = (0.0, 0.0);
+    for (frame, before) in still.iter().enumerate() {
+        let is_last = still.get(frame + 1).is_none_or(|next| *next == 0);
+        if is_last && frames.position_mm[frame][2] < 0.0 {
+            let rest = (before + 1) as f64;
+            readings += rest;
+            squares += rest * rest;
+        }
+    }
+    if readings > 0.0 { squares / readings } else { 1.0 }
 }
 
 fn memory_frames(correlation: &[f64]) -> usize {

@@ -1,4 +1,4 @@
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tactus_schema::table::{Phase, RowView};
@@ -93,6 +93,39 @@ fn the_bias_by_rounding_is_that_of_the_mean_of_many_rounded_readings() {
         // A mean of 4000 readings is not free of noise itself.
         assert!((super::bias_variance(rms * rms, 1.0) - square).abs() < 3e-4, "{rms}: {square}");
     }
+}
+
+#[test]
+fn rounding_repeats_for_as_long_as_the_tip_rests() {
+    // Presses of two seconds and rests between them, each elsewhere in the step of the converter, with little noise.
+    const DWELL: usize = 60;
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    let mut frames = resting(0.0);
+    let mut signal = 0.0;
+    for frame in 0..frames.len() {
+        if frame % DWELL == 0 {
+            signal = rng.random_range(0.0..50.0);
+        }
+        let is_press = (frame / DWELL).is_multiple_of(2);
+        frames.position_mm[frame] = [0.0, 0.0, if is_press { -0.5 } else { 2.0 }];
+        for counts in &mut frames.counts[4 * frame..4 * (frame + 1)] {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
+            let rounded = (signal + 0.2 * noise).round() as f32;
+            *counts = rounded;
+        }
+    }
+    let (noise, _) = Noise::of(&frames, &frames.counts, &still(&frames), 1.0).unwrap();
+    assert!((noise.repeated_frames - 60.0).abs() < 1.0, "{}", noise.repeated_frames);
+    // The error of a sum over many presses: each has an error of its own, which lasts for its dwell.
+    let mut error = || -> f64 {
+        let at = rng.random_range(0.0..1.0);
+        let mut reading = || -> f64 { StandardNormal.sample(&mut rng) };
+        (0..DWELL).map(|_| (at + 0.2 * reading()).round() - at).sum()
+    };
+    let square = (0..4000).map(|_| error().powi(2)).sum::<f64>() / (4000 * DWELL) as f64;
+    let got = noise.inflation(1000) * noise.rms_counts.powi(2);
+    assert!((got / square - 1.0).abs() < 0.15, "{got} for {square}");
 }
 
 #[test]

@@ -1,8 +1,11 @@
-//! What a model leaves of presses that its fit has not seen, by folds of the fitted presses.
+//! What a model leaves of presses or of elements that its fit has not seen, by folds of the fitted presses.
 //!
 //! The presses are divided into five folds. For each, the model's parameters, gains and baselines are fitted to the other four, in the
 //! linear approximation at the model that is fitted to all, and the weighted squares of what is left are summed over the blocks of the
 //! fold. Both take only products of the directions, block by block, which one pass gives ([`super::sums`]).
+//!
+//! What changes with time, the same for all elements, may take any course between two presses, so that a press says little about the next.
+//! Then the folds are of elements: what some of them tell is judged on the others, whose own gains and baselines are fitted.
 //!
 //! The presses that show a parameter may all be in one fold. So each parameter has a prior: the coefficients of a class that it had with
 //! the evidence ([`Prior`]), and of any other parameter that it stays within the longest step of a fit.
@@ -23,10 +26,24 @@ use super::sums::{Block, Kept, Segments, Total, add};
 use crate::data::DiscoverError;
 use crate::numbers::{NORMAL_PER_MEDIAN, median};
 
-/// Number of folds. The fit of each has four fifths of the presses.
+/// Number of folds. The fit of each has four fifths of the presses or elements.
 const FOLDS: usize = 5;
 /// Greatest part of a block, in standard deviations.
 const CLIP: f64 = 4.0;
+
+/// What folds are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FoldsOf {
+    Presses,
+    Elements,
+}
+
+impl FoldsOf {
+    /// Those that can confirm an effect.
+    pub(crate) fn effect(name: &str) -> Self {
+        if name == "gain-drift" { Self::Elements } else { Self::Presses }
+    }
+}
 
 /// What is known of a parameter before a fold is fitted: a normal density, on the parameter's [`Scale`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,14 +56,22 @@ struct Prior {
 impl Problem<'_> {
     /// The weighted squares of what a model leaves, block by block, each predicted by a fit to the other folds. `None` for models with
     /// random walks, which have a state of their own in every press.
-    pub(crate) fn left_by_folds(&self, at: &Fitted) -> Result<Option<Vec<f64>>, DiscoverError> {
+    pub(crate) fn left_by_folds(
+        &self,
+        at: &Fitted,
+        folds: FoldsOf,
+    ) -> Result<Option<Vec<f64>>, DiscoverError> {
         if at.parameters.walk.is_some() {
             return Ok(None);
         }
+        match folds {
+            FoldsOf::Presses => self.left_by_presses(at).map(Some),
+            FoldsOf::Elements => self.left_by_elements(at).map(Some),
+        }
+    }
+
+    fn left_by_presses(&self, at: &Fitted) -> Result<Vec<f64>, DiscoverError> {
         let own = self.own(&at.parameters);
-        let priors = self.priors(&at.parameters);
-        let least: Vec<f64> =
-            self.free(&at.parameters).iter().map(|one| least_step(&at.parameters, *one)).collect();
         let count = own.len();
         let segments = Segments::of(self, &at.parameters);
         let total = self.sums(&at.parameters, &at.predicted, own, count, Kept::AllAndBlocks, &segments)?;
@@ -56,23 +81,54 @@ impl Problem<'_> {
             let is_in = |press: usize| press % FOLDS == fold;
             let others = total.blocks.iter().zip(&press).filter(|(_, press)| !is_in(**press));
             let others = sum(others.map(|(block, _)| block), count, &segments, self);
-            let mut fitted = Elimination::of(self, &others, &segments, &at.parameters);
-            for (one, Prior { centre, precision }) in priors.iter().enumerate() {
-                fitted.reduced[(one, one)] += precision;
-                fitted.reduced[(one, count)] += precision * centre;
-                fitted.reduced[(count, one)] += precision * centre;
-                fitted.whole[one] += precision;
-            }
-            let (gram, right, squares) = fitted.equations();
-            let steps = bounded(&gram, &right, 0.0, &squares, &least);
-            let steps = steps.as_slice();
-            let element = fitted.fitted(steps);
+            let fitted = Elimination::of(self, &others, &segments, &at.parameters);
+            let steps = self.steps_by(&fitted, &at.parameters);
+            let element = fitted.fitted(&steps);
             let blocks = total.blocks.iter().zip(&press).zip(&mut left);
             for ((block, _), left) in blocks.filter(|((_, press), _)| is_in(**press)) {
-                *left = left_of(block, steps, |number| element(block.segment, number));
+                *left = left_of(block, &steps, |number| element(block.segment, number));
             }
         }
-        Ok(Some(left))
+        Ok(left)
+    }
+
+    fn left_by_elements(&self, at: &Fitted) -> Result<Vec<f64>, DiscoverError> {
+        let segments = Segments::of(self, &at.parameters);
+        let of_fold = |fold: usize| -> Result<Total, DiscoverError> {
+            let of = self.of_elements(|element| element % FOLDS == fold);
+            let own = of.own(&at.parameters);
+            let count = own.len();
+            of.sums(&at.parameters, &at.predicted, own, count, Kept::AllAndBlocks, &segments)
+        };
+        let folds: Vec<Total> = (0..FOLDS).map(of_fold).collect::<Result<_, DiscoverError>>()?;
+        let mut left = vec![0.0; folds[0].blocks.len()];
+        for (fold, of_fold) in folds.iter().enumerate() {
+            let others = folds.iter().enumerate().filter(|(other, _)| *other != fold);
+            let others = others.map(|(_, total)| total).fold(of_fold.none(), Total::joined);
+            let steps = self.steps_by(
+                &Elimination::of(self, &others, &segments, &at.parameters),
+                &at.parameters,
+            );
+            // The elements' own gains and baselines are nobody else's.
+            let own = Elimination::of(self, of_fold, &segments, &at.parameters);
+            let element = own.fitted(&steps);
+            for (left, block) in left.iter_mut().zip(&of_fold.blocks) {
+                *left += left_of(block, &steps, |number| element(block.segment, number));
+            }
+        }
+        Ok(left)
+    }
+
+    /// The steps of the free parameters that some folds want.
+    fn steps_by(&self, others: &Elimination, at: &Parameters) -> Vec<f64> {
+        let (mut gram, mut right, mut squares) = others.equations();
+        for (one, Prior { centre, precision }) in self.priors(at).into_iter().enumerate() {
+            gram[(one, one)] += precision;
+            right[one] += precision * centre;
+            squares[one] = gram[(one, one)].max(squares[one]);
+        }
+        let least: Vec<f64> = self.free(at).iter().map(|one| least_step(at, *one)).collect();
+        bounded(&gram, &right, 0.0, &squares, &least).as_slice().to_vec()
     }
 
     /// The priors of a model's free parameters. Coefficients that are 0 without their class have one variance for the class, as in the

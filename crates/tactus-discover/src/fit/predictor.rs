@@ -11,7 +11,7 @@ use super::parameters::{Parameters, Term};
 use crate::data::{Bins, DiscoverError, Frames, Known};
 
 /// The data and what is known of the rig, from which predictions are made.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Predictor<'a> {
     pub(crate) known: &'a Known,
     pub(crate) frames: &'a Frames,

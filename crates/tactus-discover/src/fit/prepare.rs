@@ -59,7 +59,11 @@ impl<'a> Prepared<'a> {
         let still = still(frames);
         let lattice = lattice::wider_step(frames, known.array.step_counts());
         let step_counts = lattice.map_or(known.array.step_counts(), |(step_counts, _)| step_counts);
-        let (noise, floor) = Noise::measured(frames, &still, step_counts);
+        let (mut noise, floor) = Noise::measured(frames, &still, step_counts);
+        if lattice.is_some() {
+            // Steps so coarse round small signals the same way in every press.
+            noise.repeated_frames = f64::INFINITY;
+        }
         let replicates = Noise::of(frames, &frames.counts, &still, step_counts).is_some();
         let mut warnings = Vec::new();
         if matches!(floor, Floor::Repeats { .. }) {

@@ -44,7 +44,7 @@ const UNSEEN_SHARE: f64 = 0.1;
 const LONG_FRAMES: usize = 1000;
 
 /// A least-squares problem: the data with their weights, and the model.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Problem<'a> {
     pub(crate) predictor: Predictor<'a>,
     /// Inverse variance of a reading of each element, times that of the bin.
@@ -172,6 +172,12 @@ impl<'a> Problem<'a> {
             predictor,
             squares_inflation: noise.squares_inflation(LONG_FRAMES),
         }
+    }
+
+    /// The same of some elements alone.
+    pub(super) fn of_elements(&self, is_in: impl Fn(usize) -> bool) -> Self {
+        let of = |(element, weight): (usize, &f64)| if is_in(element) { *weight } else { 0.0 };
+        Self { element_weight: self.element_weight.iter().enumerate().map(of).collect(), ..self.clone() }
     }
 
     /// The parameters that a fit of a model varies.

@@ -385,6 +385,19 @@ impl Total {
         }
     }
 
+    /// The sums over nothing, as many as these.
+    pub(super) fn none(&self) -> Self {
+        let elements = self.segments.first().map_or(0, |border| border.own.len());
+        Self::new(self.products.nrows(), elements, self.segments.len())
+    }
+
+    /// The sums with those over other data, without the parts of blocks.
+    pub(super) fn joined(mut self, other: &Self) -> Self {
+        self.products += &other.products;
+        self.segments.iter_mut().zip(&other.segments).for_each(|(to, of)| to.add(of));
+        self
+    }
+
     /// Adds the sums over a part of a block; parts come in order of time.
     fn add(&mut self, number: usize, first_bin: usize, own: usize, sums: &Sums, kept: Kept) {
         for (place, column) in sums.active.iter().enumerate() {

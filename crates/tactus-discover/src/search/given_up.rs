@@ -36,7 +36,7 @@ impl GivenUp {
             }
             Because::Little => "it explains too little by itself or beside the others".into(),
             Because::Other(other) => format!("{other} explains more in its place"),
-            Because::Unconfirmed => "presses that its fit has not seen do not confirm it".into(),
+            Because::Unconfirmed => "presses or elements that its fit has not seen do not confirm it".into(),
         }
     }
 }

@@ -11,7 +11,7 @@ use super::discovery::{
 use super::drafting::{DraftedEffect, Drafting, drafted};
 use super::held_out::{HeldOutResidual, SEEN_NOISE, closed_share};
 use crate::data::{DiscoverError, MISWIRED};
-use crate::fit::{Fitted, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
+use crate::fit::{Fitted, FoldsOf, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
     ALPHA, Alike, Because, Contest, Equivalent, FLIPS, Formed, GivenUp, Left, Located, NoDraft, NotShown,
@@ -193,7 +193,7 @@ pub(crate) fn conclude(
         tentative,
         final_: Final {
             level: grown_level,
-            shrink: closed_share(levels, noise_counts).filter(|_| p_value <= ALPHA),
+            closed: prepared.closed([&of_base, &of_grown], floor).filter(|_| p_value <= ALPHA),
         },
         verdict,
         draft,
@@ -429,7 +429,7 @@ impl Prepared<'_> {
             tentative: Vec::new(),
             inclusions: Vec::new(),
             contests: Vec::new(),
-            final_: Final { level, shrink: None },
+            final_: Final { level, closed: None },
             verdict: Verdict::CannotJudge,
             given_up: Vec::new(),
             staircase: Vec::new(),
@@ -512,7 +512,7 @@ impl Search<'_> {
     ) -> Result<Vec<Step>, DiscoverError> {
         let known_terms = self.problem.predictor.known.effects.len();
         let names = names(&grown.parameters, known_terms);
-        let of_grown = if names.is_empty() { None } else { self.problem.left_by_folds(grown)? };
+        let mut of_grown: Vec<(FoldsOf, Option<Vec<f64>>)> = Vec::new();
         let mut steps = Vec::new();
         for name in names {
             let problem = if name == MISWIRED { with_silent } else { self.problem };
@@ -547,8 +547,13 @@ impl Search<'_> {
             };
             let curves = fitted_curves(grown, known_terms, name, refuted.get(name));
             let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
-            let of_less = self.problem.left_by_folds(&before)?;
-            let by_folds = of_less.zip(of_grown.as_ref()).map(|(less, grown)| gains_by_folds(&less, grown));
+            let folds = FoldsOf::effect(name);
+            if of_grown.iter().all(|(of, _)| *of != folds) {
+                of_grown.push((folds, self.problem.left_by_folds(grown, folds)?));
+            }
+            let of_grown = of_grown.iter().find(|(of, _)| *of == folds).and_then(|(_, left)| left.as_ref());
+            let of_less = self.problem.left_by_folds(&before, folds)?;
+            let by_folds = of_less.zip(of_grown).map(|(less, grown)| gains_by_folds(&less, grown));
             let blocks = by_folds.iter().flatten().filter(|gain| **gain != 0.0).count();
             let least_p = 0.5_f64.powf(blocks as f64);
             let added = AddedEffect {

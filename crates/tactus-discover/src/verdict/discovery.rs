@@ -4,6 +4,7 @@ use tactus_calibrate::FaultyElement;
 use tactus_model::effect::By;
 use tactus_model::{Effect, Psf, Response};
 
+use super::closed::Closed;
 use super::drafting::DraftedEffect;
 use super::structured::Structured;
 use crate::data::Floor;
@@ -221,8 +222,8 @@ pub struct Estimated {
 pub struct Final {
     /// Its distance from the held-out frames.
     pub level: Level,
-    /// `(MSE_base - MSE_final) / (MSE_base - noise^2)`; `None` where there is no gap to close.
-    pub shrink: Option<f64>,
+    /// What it closes of the base model's gap; `None` where there is no gap to close.
+    pub closed: Option<Closed>,
 }
 
 /// The result of a discovery in one word.

@@ -8,7 +8,7 @@ use super::{
     DiscoveryReport, draft,
     figures::staircase,
     gap, next,
-    words::{list, percent},
+    words::{self, list, percent},
 };
 use crate::{
     document::{Column, Table},
@@ -67,9 +67,9 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
          difference of their mean squares. What is structured is not noise: among all held-out readings, or among those with a signal if more is \
          structured there. {}</p>\n</section>",
         staircase(found),
-        found.final_.shrink.map_or_else(String::new, |share| format!(
+        found.final_.closed.map_or_else(String::new, |of_gap| format!(
             "{} of the base model's gap was closed, in mean squares.",
-            percent(share)
+            words::closed(of_gap)
         ))
     )
 }

@@ -143,6 +143,7 @@ struct GrownJson {
     #[serde(flatten)]
     level: LevelJson,
     shrink: Option<f64>,
+    shrink_se: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -429,7 +430,8 @@ impl<'a> ReportJson<'a> {
             contests: found.contests.iter().map(ContestJson::of).collect(),
             grown: GrownJson {
                 level: LevelJson::of(found.final_.level, found.floor),
-                shrink: found.final_.shrink,
+                shrink: found.final_.closed.map(|closed| closed.share),
+                shrink_se: found.final_.closed.and_then(|closed| closed.standard_error),
             },
             verdict: found.verdict.name(),
             verdict_text: in_words(found),

@@ -41,8 +41,8 @@ pub fn in_words(found: &Discovery) -> String {
         |noise| format!("the noise is {} counts, from {}", digits(noise, 3), found.floor.source()),
     );
     let bound = bound(found);
-    let closed = found.final_.shrink.map_or_else(String::new, |share| {
-        format!(", which closes {} of the gap between model and noise", percent(share))
+    let closed = found.final_.closed.map_or_else(String::new, |of_gap| {
+        format!(", which closes {} of the gap between model and noise", closed(of_gap))
     });
     let falls = if found.base == found.final_.level {
         format!("On held-out presses the residual is {before} counts rms; {noise_is}.")

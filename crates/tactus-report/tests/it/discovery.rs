@@ -267,7 +267,7 @@ fn the_verdict_says_what_it_rests_on() {
     assert_eq!(
         in_words(&explained()),
         "The model was missing hysteresis and miswired. On held-out presses the residual falls from 9.36 to 2.08 counts rms, which \
-         closes 99.6 % of the gap between model and noise; the noise is 2.00 counts, from repeats in time. Of readings with a signal, 0.29 \
+         closes 99.6 % +- 0.4 % of the gap between model and noise; the noise is 2.00 counts, from repeats in time. Of readings with a signal, 0.29 \
          times the noise (0.57 counts) is not noise; with 95 % confidence it is at most 0.36 times the noise (0.71 counts). A structured \
          residual of 2.50 counts was declared tolerable beforehand."
     );

@@ -21,7 +21,7 @@ use std::ops::Range;
 use tactus_model::Phase;
 
 use super::stretches::stretches;
-use super::{ALIKE_Z, DIFFERENCES_SHARE, FREEDOM_LEAST, Noise, bias_variance, pooled};
+use super::{ALIKE_Z, DIFFERENCES_SHARE, FREEDOM_LEAST, Noise, bias_variance, pooled, repeated_frames};
 use crate::data::frames::Frames;
 use crate::data::motion::{STILL_MM, pressing};
 use crate::numbers::median;
@@ -86,6 +86,7 @@ pub(super) fn noise(frames: &Frames, still: &[usize], step_counts: f64) -> Optio
         by_element_counts: variances.iter().map(|variance| variance.sqrt()).collect(),
         correlation: known.map(correlation).collect(),
         rounding_share: bias_variance(typical - rounding, step_counts) / typical,
+        repeated_frames: repeated_frames(frames, still),
     };
     Some((noise, freedom))
 }

@@ -18,7 +18,7 @@
 use std::f64::consts::E;
 use std::ops::Range;
 
-use super::{ALIKE_Z, Noise, PAIRS_LEAST, bias_variance, pooled};
+use super::{ALIKE_Z, Noise, PAIRS_LEAST, bias_variance, pooled, repeated_frames};
 use crate::data::frames::Frames;
 use crate::data::motion::CLEAR_MM;
 use crate::numbers::median;
@@ -103,6 +103,7 @@ pub(super) fn noise(
         by_element_counts: variances.iter().map(|variance| variance.sqrt()).collect(),
         correlation: (0..=10 * LAGS).map(correlation).take_while(|rho| *rho > 1e-3).collect(),
         rounding_share: bias_variance(typical - rounding, step_counts) / typical,
+        repeated_frames: repeated_frames(frames, still),
     };
     Some((noise, freedom))
 }

@@ -136,7 +136,7 @@ pub(crate) fn explained() -> Discovery {
                 equivalent: vec![],
             },
         ],
-        final_: Final { level: level(2.08), shrink: Some(0.996_1) },
+        final_: Final { level: level(2.08), closed: Some(Closed { share: 0.996_1, standard_error: Some(0.004) }) },
         verdict: Verdict::Explained,
         draft: None,
         unexplained: Unexplained { depends_on: vec![], gap: vec![], share: 0.003_9 },
@@ -210,7 +210,7 @@ pub(crate) fn nothing_missing() -> Discovery {
         tentative: vec![],
         inclusions: vec![],
         contests: vec![],
-        final_: Final { level: level(2.01), shrink: None },
+        final_: Final { level: level(2.01), closed: None },
         verdict: Verdict::NothingMissing,
         given_up: vec![],
         staircase: vec![Stair { with: "base model".into(), heldout_rms_counts: 2.02 }],
@@ -252,7 +252,7 @@ pub(crate) fn unexplained() -> Discovery {
     Discovery {
         floor: Floor::Repeats { rms_counts: NOISE_COUNTS, freedom: 12.0 },
         tolerance_counts: None,
-        final_: Final { level: whole.base, shrink: Some(0.0) },
+        final_: Final { level: whole.base, closed: Some(Closed { share: 0.0, standard_error: None }) },
         rounds: vec![Round { taken: None, ..whole.rounds[0].clone() }],
         steps: vec![],
         tentative: vec![],
@@ -279,7 +279,7 @@ pub(crate) fn cannot_judge() -> Discovery {
         floor: Floor::None,
         global: None,
         base: level,
-        final_: Final { level, shrink: None },
+        final_: Final { level, closed: None },
         verdict: Verdict::CannotJudge,
         staircase: vec![],
         unexplained: Unexplained { depends_on: vec![], gap: vec![], share: 1.0 },
@@ -317,7 +317,7 @@ pub(crate) fn empty() -> Discovery {
         global: Some(GlobalTest { statistic: f64::NAN, p_value: f64::NAN }),
         curves: vec![],
         elements: vec![],
-        final_: Final { level: nowhere, shrink: None },
+        final_: Final { level: nowhere, closed: None },
         ..nothing_missing()
     }
 }

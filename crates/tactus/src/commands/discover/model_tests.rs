@@ -1,4 +1,4 @@
-use tactus_discover::{Final, Floor, GlobalTest, Level, Plan, Split, Unexplained, Verdict};
+use tactus_discover::{Closed, Final, Floor, GlobalTest, Level, Plan, Split, Unexplained, Verdict};
 use tactus_model::effect::Definition;
 use tactus_schema::Rig;
 
@@ -88,7 +88,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
             curves: Vec::new(),
             equivalent: Vec::new(),
         }],
-        final_: Final { level, shrink: Some(1.0) },
+        final_: Final { level, closed: Some(Closed { share: 1.0, standard_error: None }) },
         verdict: Verdict::Explained,
         draft: None,
         unexplained: Unexplained { depends_on: Vec::new(), gap: Vec::new(), share: 0.0 },
