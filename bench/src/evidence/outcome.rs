@@ -115,7 +115,11 @@ impl Outcome {
 
     /// The shrink if it is known within a tenth; 0 without a report.
     pub fn known_shrink(&self) -> Option<f64> {
-        if self.has_failed() { Some(0.0) } else { self.shrink.filter(|_| self.shrink_error <= SHRINK_ERROR_MAX) }
+        if self.has_failed() {
+            Some(0.0)
+        } else {
+            self.shrink.filter(|_| self.shrink_error <= SHRINK_ERROR_MAX)
+        }
     }
 
     /// True if a hidden physics is a point of the library's own parameters.

@@ -105,10 +105,8 @@ impl Problem<'_> {
         for (fold, of_fold) in folds.iter().enumerate() {
             let others = folds.iter().enumerate().filter(|(other, _)| *other != fold);
             let others = others.map(|(_, total)| total).fold(of_fold.none(), Total::joined);
-            let steps = self.steps_by(
-                &Elimination::of(self, &others, &segments, &at.parameters),
-                &at.parameters,
-            );
+            let steps =
+                self.steps_by(&Elimination::of(self, &others, &segments, &at.parameters), &at.parameters);
             // The elements' own gains and baselines are nobody else's.
             let own = Elimination::of(self, of_fold, &segments, &at.parameters);
             let element = own.fitted(&steps);

@@ -75,7 +75,8 @@ fn presses_that_a_fit_has_not_seen_are_further_from_it_and_a_true_effect_gains_o
     let with = problem.fit_from(prepared.base.parameters.with(Term::of(&hidden)), 12).unwrap();
     let left: f64 = problem.left_by_folds(&with, FoldsOf::Presses).unwrap().unwrap().iter().sum();
     assert!(left > with.cost, "{left} {}", with.cost);
-    let [base, with] = [&prepared.base, &with].map(|at| problem.left_by_folds(at, FoldsOf::Presses).unwrap().unwrap());
+    let [base, with] =
+        [&prepared.base, &with].map(|at| problem.left_by_folds(at, FoldsOf::Presses).unwrap().unwrap());
     let gains = gains_by_folds(&base, &with);
     let gained = gains.iter().filter(|gain| **gain > 0.0).count();
     assert!(2 * gained > gains.len(), "{gained} of {}", gains.len());
@@ -96,7 +97,8 @@ fn drifted(known: &Known, seed: u64) -> (Frames, Term) {
     let jumps = [0.0, 0.06, -0.04, 0.05, 0.08, -0.03, 0.04, -0.06, 0.07, 0.01];
     let at_s = (1..=jumps.len()).map(|knot| 8.0 * knot as f64).collect();
     let knots = Knots { at: at_s, values: jumps.to_vec() };
-    let effect = Effect::of_knots(Definition::find("gain-drift").unwrap(), [("rate_per_k", 0.0)], knots).unwrap();
+    let effect =
+        Effect::of_knots(Definition::find("gain-drift").unwrap(), [("rate_per_k", 0.0)], knots).unwrap();
     let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(seed));
     (measured(known, std::slice::from_ref(&effect), &noise), Term::of(&effect))
 }
@@ -123,7 +125,8 @@ fn what_is_left_of_elements_is_what_a_fit_to_the_others_leaves_of_them() {
                 [weight, fitted.predicted[place], problem.predictor.bins.counts[place]]
             };
             let readings: Vec<[f64; 3]> = bins.map(reading).collect();
-            let sum = |of: &dyn Fn(&[f64; 3]) -> f64| readings.iter().map(|one| one[0] * of(one)).sum::<f64>();
+            let sum =
+                |of: &dyn Fn(&[f64; 3]) -> f64| readings.iter().map(|one| one[0] * of(one)).sum::<f64>();
             let all = sum(&|_| 1.0);
             let [x, y] = [1, 2].map(|column: usize| sum(&|one| one[column]) / all);
             let xx = sum(&|one| (one[1] - x).powi(2));
@@ -144,8 +147,7 @@ fn a_gain_that_jumps_from_press_to_press_is_confirmed_by_elements() {
     let with = problem.fit_from(prepared.base.parameters.with(term), 12).unwrap();
     let left = |at: &Fitted| problem.left_by_folds(at, FoldsOf::Elements).unwrap().unwrap();
     let gains = gains_by_folds(&left(&prepared.base), &left(&with));
-    let (gained, lost): (f64, f64) = gains.iter().fold((0.0, 0.0), |(gained, lost), gain| {
-        (gained + gain.max(0.0), lost - gain.min(0.0))
-    });
+    let (gained, lost): (f64, f64) =
+        gains.iter().fold((0.0, 0.0), |(gained, lost), gain| (gained + gain.max(0.0), lost - gain.min(0.0)));
     assert!(gained > 4.0 * lost, "{gained} {lost}");
 }

@@ -86,6 +86,11 @@ impl Term {
         self.listed() > 0
     }
 
+    /// True if its knots are weights, which may be those of several formulas.
+    pub(crate) fn is_sum(&self) -> bool {
+        self.knots.is_some() && self.curve().is_some_and(|curve| curve.kind == CurveKind::Weights)
+    }
+
     /// Moves all its knots from their neutral values: those of a curve by these steps, those of a table by steps on the parameter's scale.
     pub(crate) fn free_steps(&mut self, steps: &[f64], duration_s: f64) {
         for (knot, step) in steps.iter().enumerate() {

@@ -242,12 +242,22 @@ impl Problem<'_> {
         let count = chunk.columns.len() + 1;
         let weighed: Vec<usize> =
             (0..elements).filter(|element| self.element_weight[*element] > 0.0).collect();
-        // Each reading's place in the chunk, and the root of its weight: bin by bin, element by element.
-        let place = |bin: &usize| {
-            let start = (bin - chunk.bins.start) * elements;
-            weighed.iter().map(move |element| start + element)
+        let per_bin = weighed.len();
+        // Adds the weighed readings of a bin, times a factor each.
+        let take = |of_bin: &[f64], factors: &[f64], to: &mut Vec<f64>| {
+            if per_bin == elements {
+                to.extend(of_bin.iter().zip(factors).map(|(value, factor)| value * factor));
+            } else {
+                to.extend(weighed.iter().zip(factors).map(|(element, factor)| of_bin[*element] * factor));
+            }
         };
-        let places: Vec<usize> = part.iter().flat_map(place).collect();
+        // Weighed readings of a column in the part's bins, times the roots of their weights: bin by bin, element by element.
+        let rooted = |column: &[f64], roots: &[f64], to: &mut Vec<f64>| {
+            for (bin, roots) in part.iter().zip(roots.chunks_exact(per_bin.max(1))) {
+                let start = (bin - chunk.bins.start) * elements;
+                take(&column[start..start + elements], roots, to);
+            }
+        };
         let root = |bin: &usize| {
             let of_bin = self.train[*bin];
             weighed.iter().map(move |element| (of_bin * self.element_weight[*element]).sqrt())
@@ -255,10 +265,10 @@ impl Problem<'_> {
         let roots: Vec<f64> = part.iter().flat_map(root).collect();
         let standing = &standing[chunk.bins.start * elements..chunk.bins.end * elements];
         let mut border = Border::new(count, elements);
-        let gains: Vec<f64> =
-            places.iter().zip(&roots).map(|(place, root)| root * chunk.by_gain[*place]).collect();
-        let per_bin = weighed.len().max(1);
-        for (roots, gains) in roots.chunks_exact(per_bin).zip(gains.chunks_exact(per_bin)) {
+        let mut gains = Vec::with_capacity(roots.len());
+        rooted(&chunk.by_gain, &roots, &mut gains);
+        let of_bins = || roots.chunks_exact(per_bin.max(1)).zip(gains.chunks_exact(per_bin.max(1)));
+        for (roots, gains) in of_bins() {
             for ((element, root), gain) in weighed.iter().zip(roots).zip(gains) {
                 let [one, mixed, square] = &mut border.own[*element];
                 *one += root * root;
@@ -268,26 +278,33 @@ impl Problem<'_> {
         }
         // Directions that do nothing here, such as those of contact far from it, take no part.
         let mut active: Vec<usize> = Vec::new();
-        let mut values: Vec<f64> = Vec::new();
+        let mut values: Vec<f64> = Vec::with_capacity(roots.len() * count);
+        let (mut by_baseline, mut by_gain) = (vec![0.0; per_bin], vec![0.0; per_bin]);
         for number in 0..count {
             let column = chunk.columns.get(number).map_or(standing, |column| column);
-            if places.iter().all(|place| column[*place] == 0.0) {
+            let at = values.len();
+            rooted(column, &roots, &mut values);
+            if values[at..].iter().all(|value| *value == 0.0) {
+                values.truncate(at);
                 continue;
             }
-            let at = values.len();
-            values.extend(places.iter().zip(&roots).map(|(place, root)| root * column[*place]));
             active.push(number);
-            let (mut by_baseline, mut by_gain) =
-                (border.by_baseline.column_mut(number), border.by_gain.column_mut(number));
-            let of_bins = values[at..].chunks_exact(per_bin).zip(gains.chunks_exact(per_bin));
-            for ((values, gains), roots) in of_bins.zip(roots.chunks_exact(per_bin)) {
-                for (((element, value), gain), root) in weighed.iter().zip(values).zip(gains).zip(roots) {
-                    by_baseline[*element] += value * root;
-                    by_gain[*element] += value * gain;
+            by_baseline.fill(0.0);
+            by_gain.fill(0.0);
+            for (values, (roots, gains)) in values[at..].chunks_exact(per_bin).zip(of_bins()) {
+                for ((sum, value), root) in by_baseline.iter_mut().zip(values).zip(roots) {
+                    *sum += value * root;
+                }
+                for ((sum, value), gain) in by_gain.iter_mut().zip(values).zip(gains) {
+                    *sum += value * gain;
                 }
             }
+            for ((element, of_baseline), of_gain) in weighed.iter().zip(&by_baseline).zip(&by_gain) {
+                border.by_baseline[(*element, number)] = *of_baseline;
+                border.by_gain[(*element, number)] = *of_gain;
+            }
         }
-        let values = DMatrix::from_vec(places.len(), active.len(), values);
+        let values = DMatrix::from_vec(roots.len(), active.len(), values);
         let first = active.iter().take_while(|number| **number < pivots).count();
         let mut products = DMatrix::zeros(active.len(), active.len());
         // The products of the pivots with each other are the same both ways, so only one half of them is computed, panel by panel.

@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use tactus_model::effect::Knots;
+use tactus_model::effect::{CurveKind, Knots};
 
 use super::grow::{Equivalent, POLISH_ROUNDS, Search, names};
 use crate::data::DiscoverError;
@@ -71,6 +71,19 @@ impl Search<'_> {
             };
         }
         Ok(formed)
+    }
+
+    /// Several formulas of a class whose curve is of weights, as one term with knots: they are fewer numbers, and all of them linear. Formulas
+    /// stay apart if together they act the other way than weights can.
+    pub(super) fn joined(&self, terms: Vec<Term>) -> Vec<Term> {
+        let curve = terms.first().and_then(Term::curve).filter(|curve| curve.kind == CurveKind::Weights);
+        let Some(curve) = curve.filter(|_| terms.len() > 1) else { return terms };
+        let at = places(curve, self.problem);
+        let together: f64 = terms.iter().flat_map(|term| (curve.formula)(&term.values, &at)).sum();
+        if !(curve.range[0]..=curve.range[1]).contains(&together) {
+            return terms;
+        }
+        vec![Term { knots: Some(of_formulas(curve, &terms, &at)), ..terms[0].clone() }]
     }
 
     /// The formula of a class as knots; `None` if it has no curve, or no formula to refute.

@@ -374,7 +374,7 @@ impl Search<'_> {
         set: &Set,
         name: &'static str,
     ) -> Vec<(&'static str, Vec<Term>)> {
-        let terms = self.starts(pass, evidence, set, name);
+        let terms = self.joined(self.starts(pass, evidence, set, name));
         let is_formula = terms.len() == 1 && !terms[0].is_free();
         let formula = if is_formula { None } else { self.formula_start(pass, name) };
         let alone = |member: &usize| evidence.gain_alone(*member).ln_odds;
@@ -503,7 +503,8 @@ impl Search<'_> {
     }
 
     pub(super) fn rank_of(&self, name: &str, ln_odds: f64, at: &Fitted) -> f64 {
-        let is_free = self.added(at, name).any(Term::is_free);
+        // Weights are the sum of several formulas, and no more free than those.
+        let is_free = self.added(at, name).any(|term| term.is_free() && !term.is_sum());
         ln_odds - if is_free { excused(ln_odds) } else { 0.0 }
     }
 

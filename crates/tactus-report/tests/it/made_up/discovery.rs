@@ -136,7 +136,10 @@ pub(crate) fn explained() -> Discovery {
                 equivalent: vec![],
             },
         ],
-        final_: Final { level: level(2.08), closed: Some(Closed { share: 0.996_1, standard_error: Some(0.004) }) },
+        final_: Final {
+            level: level(2.08),
+            closed: Some(Closed { share: 0.996_1, standard_error: Some(0.004) }),
+        },
         verdict: Verdict::Explained,
         draft: None,
         unexplained: Unexplained { depends_on: vec![], gap: vec![], share: 0.003_9 },
