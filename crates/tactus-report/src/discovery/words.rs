@@ -177,10 +177,15 @@ pub(super) fn percent(share: f64) -> String {
     format!("{} %", short(percent, usize::from((percent - 100.0).abs() < 2.0 || percent.abs() < 2.0)))
 }
 
-/// Such as `83 % +- 6 %`.
+/// Such as `83 % +- 6 %` or `99.96 % +- 0.03 %`: the error has one digit at least, and the share as many decimals.
 pub fn closed(Closed { share, standard_error }: Closed) -> String {
-    let error = standard_error.map_or_else(String::new, |error| format!(" +- {}", percent(error)));
-    format!("{}{error}", percent(share))
+    let Some(error) = standard_error else { return percent(share) };
+    let places = if error < 0.000_95 {
+        2
+    } else {
+        usize::from(error < 0.0095)
+    };
+    format!("{} % +- {} %", short(100.0 * share, places), short((100.0 * error).max(0.01), places))
 }
 
 /// A residual in counts and in units of the noise.
