@@ -51,13 +51,19 @@ def pulse_program() -> str:
 
 
 @pytest.fixture
-def pulse(pulse_program, free_endpoint):
-    """Starts a publisher at 200 Hz that loses every tenth frame at the device, and gives its endpoint."""
+def pulse(pulse_process):
+    """The endpoint of a publisher at 200 Hz that loses every tenth frame at the device."""
+    return pulse_process[0]
+
+
+@pytest.fixture
+def pulse_process(pulse_program, free_endpoint):
+    """Starts that publisher, and gives its endpoint and its process."""
     process = subprocess.Popen([pulse_program, free_endpoint, "200", "10"], stdout=subprocess.PIPE, text=True)
     try:
         ready = json.loads(process.stdout.readline())
         assert ready["ready"] and ready["endpoint"] == free_endpoint
-        yield free_endpoint
+        yield free_endpoint, process
     finally:
         process.terminate()
         process.communicate()

@@ -7,6 +7,7 @@ import json
 import os
 import re
 import socket
+import weakref
 
 import zenoh
 
@@ -86,6 +87,8 @@ class Client:
         self._services = services
         self._endpoint = endpoint
         self._lease: Lease | None = None
+        # Called when nobody has the client any more, and at the end of the program: zenoh's threads must not outlive Python.
+        self._closing = weakref.finalize(self, session.close)
         self.rig = rig
 
     def frames(self, history: int | None = None) -> FrameStream:
@@ -156,8 +159,10 @@ class Client:
         return self._holding("reset", messages.CommandRequest, {}, timeout_s)
 
     def close(self) -> None:
-        """Closes the connection; streams end."""
-        self._session.close()
+        """Gives the lease back and closes the connection; streams end. The end of the program does the same."""
+        if self._lease is not None:
+            self._lease.release()
+        self._closing()
 
     def __enter__(self):
         return self

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import threading
 
 from tactus_client import messages
@@ -9,6 +10,8 @@ from tactus_client.errors import NoAnswer, Refused
 
 #: Time between two renewals: a lease without one ends after 5 s.
 RENEWAL_S = 1.5
+#: How long to wait for the service when the lease is given back: it ends by itself.
+RELEASE_TIMEOUT_S = 1.0
 #: Exit code of a client that does not hold the lease.
 NOT_HOLDER = 5
 
@@ -26,6 +29,7 @@ class Lease:
         self._released = threading.Event()
         self._keeping = threading.Thread(target=self._keep, name="tactus-lease", daemon=True)
         self._keeping.start()
+        atexit.register(self.release)
 
     @property
     def is_held(self) -> bool:
@@ -37,10 +41,11 @@ class Lease:
         if self._released.is_set():
             return
         self._released.set()
-        self._keeping.join()
+        atexit.unregister(self.release)
+        self._keeping.join(RELEASE_TIMEOUT_S)
         if self.lost is None:
             try:
-                self._ask("LEASE_ACTION_RELEASE", lease=self.secret)
+                self._ask("LEASE_ACTION_RELEASE", RELEASE_TIMEOUT_S, lease=self.secret)
             except (NoAnswer, Refused):
                 # It ends by itself.
                 pass
@@ -51,8 +56,8 @@ class Lease:
     def __exit__(self, *_):
         self.release()
 
-    def _ask(self, action: str, **fields):
-        return self._command("lease", messages.LeaseRequest(action=action, who=self._who, **fields), 3.0)
+    def _ask(self, action: str, timeout_s: float = 3.0, **fields):
+        return self._command("lease", messages.LeaseRequest(action=action, who=self._who, **fields), timeout_s)
 
     def _keep(self) -> None:
         while not self._released.wait(RENEWAL_S):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import weakref
 from collections import deque
 
 import zenoh
@@ -46,10 +47,13 @@ class Stream:
         self.foreign = 0
         # ``$*`` matches no other key. Zenoh gives a key without a wild card a number, and a service with access control may
         # crash when a client that has given one connects or leaves (zenoh 1.10.2).
+        # Direct: an indirect callback has a thread, for whose end Python waits before it lets anybody close the session. Weak: a
+        # stream that nobody has any more ends.
+        hear, end = weakref.WeakMethod(self._hear), weakref.WeakMethod(self._end)
         self._subscriber = zenoh.ext.declare_advanced_subscriber(
             session,
             f"{key}$*",
-            zenoh.handlers.Callback(self._hear, self._end),
+            zenoh.handlers.Callback(lambda sample: _call(hear, sample), lambda: _call(end), indirect=False),
             recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
         )
         # Request the past only after subscribing, so that no message is lost in between.
@@ -124,6 +128,12 @@ class Stream:
         with self._changed:
             self._closed = True
             self._changed.notify_all()
+
+
+def _call(method: weakref.WeakMethod, *arguments) -> None:
+    alive = method()
+    if alive is not None:
+        alive(*arguments)
 
 
 def past_samples(session, key: str, history: int | None):
