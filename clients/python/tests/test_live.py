@@ -86,6 +86,7 @@ def test_an_absent_rig_does_not_answer(pulse):
 def test_a_closed_stream_ends(client):
     frames = client.frames()
     frames.close()
+    frames.close()
     assert len(list(frames)) == frames.tally.received
 
 

@@ -92,8 +92,15 @@ pub(crate) fn main() -> ExitCode {
         }
     };
     let _log = tactus_log::start(options.log.unwrap_or(config.log.format), &config.log.filter);
-    let config = ServiceConfig { recordings: options.recordings.unwrap_or(config.recordings), ..config };
-    match start(config) {
+    // Clients are told where a recording is, and have other working directories.
+    let recordings = match std::path::absolute(options.recordings.as_ref().unwrap_or(&config.recordings)) {
+        Ok(recordings) => recordings,
+        Err(error) => {
+            error!("the folder of recordings: {error}");
+            return ExitCode::FAILURE;
+        }
+    };
+    match start(ServiceConfig { recordings, ..config }) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             error!("{error}");

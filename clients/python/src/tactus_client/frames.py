@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from tactus_client import messages
-from tactus_client.stream import Stream
+import zenoh
+
+from tactus_client import html, messages
+from tactus_client.stream import Believes, Stream
 
 try:
     import numpy
 except ImportError:
-    numpy = None
+    numpy = None  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Frame:
     t_mono_ns: int
     t_wall_ns: int
     #: Raw counts, row-major, row 0 column 0 at the origin corner.
-    counts: tuple
+    counts: tuple[float, ...]
     #: Bits of ``FrameFlag``.
     flags: int
     #: Frames lost at the device or on its link just before this one.
@@ -36,12 +38,12 @@ class Frame:
     #: True if no physical sensor was read.
     simulated: bool
     #: Rows and columns of the array; None if the service has not told them.
-    shape: tuple | None
+    shape: tuple[int, int] | None
     #: Indices of elements that were not read; ``counts`` holds their last reading, or 0.
-    bad_elements: tuple = ()
+    bad_elements: tuple[int, ...] = ()
 
     @property
-    def image(self):
+    def image(self) -> Any:
         """The counts as rows x columns: a numpy array of float32 if numpy is installed, else a list of lists."""
         if self.shape is None:
             raise ValueError("the service has not told the array's rows and columns; use .counts, which are row-major")
@@ -52,8 +54,15 @@ class Frame:
             return numpy.array(self.counts, dtype=numpy.float32).reshape(rows, cols)
         return [list(self.counts[row * cols : (row + 1) * cols]) for row in range(rows)]
 
+    def _repr_html_(self) -> str:
+        if self.shape is None or self.shape[0] * self.shape[1] != len(self.counts):
+            return f"<code>{html.escape(repr(self))}</code>"
+        bad = f", not read: {', '.join(map(str, self.bad_elements))}" if self.bad_elements else ""
+        simulated = ", SIMULATED" if self.simulated else ""
+        return html.image(self.image, f"frame {self.seq}, counts{simulated}{bad}")
+
     @classmethod
-    def of(cls, message, shape: tuple | None) -> Frame:
+    def of(cls, message: Any, shape: tuple[int, int] | None) -> Frame:
         """A ``tactus.v1.Frame`` as an object."""
         return cls(
             seq=message.seq,
@@ -82,7 +91,7 @@ class Missing(NamedTuple):
 class Tally:
     """Counts frames, and the frames that are missing between them."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.received = 0
         self.device_lost = 0
         self.bus_missing = 0
@@ -107,13 +116,15 @@ class Tally:
         self.last_seq = seq
 
 
-class FrameStream(Stream):
+class FrameStream(Stream[Any]):
     """Iterates over frames as objects and counts them in ``tally`` and ``missing``."""
 
     #: Frames that may wait to be read: 5 minutes at 30 Hz.
     CAPACITY = 9_000
 
-    def __init__(self, session, key: str, history: int | None, shape: tuple | None, believes):
+    def __init__(
+        self, session: zenoh.Session, key: str, history: int | None, shape: tuple[int, int] | None, believes: Believes
+    ):
         self._shape = shape
         self.tally = Tally()
         super().__init__(session, key, messages.Frame, history, self.CAPACITY, believes)

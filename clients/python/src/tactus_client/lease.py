@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import atexit
 import threading
+from collections.abc import Callable
+from typing import Any
 
 from tactus_client import messages
 from tactus_client.errors import NoAnswer, Refused
@@ -19,11 +21,11 @@ NOT_HOLDER = 5
 class Lease:
     """The lease, renewed until it is released. Made by ``Client.lease``; use it in a ``with`` statement."""
 
-    def __init__(self, command, who: str, take_over: str | None):
+    def __init__(self, command: Callable[[str, Any, float], messages.CommandReply], who: str, take_over: str | None):
         self._command = command
         self._who = who
         action = "LEASE_ACTION_ACQUIRE" if take_over is None else "LEASE_ACTION_TAKE_OVER"
-        self.secret = self._ask(action, reason=take_over or "").lease.lease
+        self.secret: bytes = self._ask(action, reason=take_over or "").lease.lease
         #: Why the service no longer accepts the lease; None while it does.
         self.lost: str | None = None
         self._released = threading.Event()
@@ -50,13 +52,13 @@ class Lease:
                 # It ends by itself.
                 pass
 
-    def __enter__(self):
+    def __enter__(self) -> Lease:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.release()
 
-    def _ask(self, action: str, timeout_s: float = 3.0, **fields):
+    def _ask(self, action: str, timeout_s: float = 3.0, **fields: Any) -> messages.CommandReply:
         return self._command("lease", messages.LeaseRequest(action=action, who=self._who, **fields), timeout_s)
 
     def _keep(self) -> None:

@@ -32,7 +32,7 @@ def _load():
 
 POOL, _CLASSES = _load()
 globals().update(_CLASSES)
-__all__ = [*_CLASSES, "DecodeError", "encoding", "name_of"]  # pyright: ignore[reportUnsupportedDunderAll]
+__all__ = [*_CLASSES, "DecodeError", "encoding", "is_repeated", "name_of", "to_dict", "word_of"]  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def encoding(message_class) -> str:
@@ -48,3 +48,31 @@ def name_of(message, field: str) -> str:
     number = getattr(message, field)
     value = message.DESCRIPTOR.fields_by_name[field].enum_type.values_by_number.get(number)
     return value.name if value else str(number)
+
+
+def word_of(message, field: str) -> str:
+    """The value of an enum in one word: ``word_of(state, "phase")`` gives, for example, ``running``."""
+    prefix = message.DESCRIPTOR.fields_by_name[field].enum_type.values_by_number[0].name.removesuffix("UNSPECIFIED")
+    return name_of(message, field).removeprefix(prefix).lower()
+
+
+def to_dict(message) -> dict:
+    """The fields of a message that are set, by name: enums as words, times as whole numbers."""
+
+    def plain(field, value):
+        if field.message_type is not None:
+            return to_dict(value)
+        return value if field.enum_type is None else word_of(message, field.name)
+
+    def value_of(field, value):
+        if field.message_type is not None and field.message_type.GetOptions().map_entry:
+            return dict(value)
+        return [plain(field, one) for one in value] if is_repeated(field) else plain(field, value)
+
+    return {field.name: value_of(field, value) for field, value in message.ListFields()}
+
+
+def is_repeated(field) -> bool:
+    """True if the field of a descriptor is a list or a map."""
+    # Protobuf 4 has no other way to ask; 7 has not this one.
+    return field.is_repeated if hasattr(field, "is_repeated") else field.label == field.LABEL_REPEATED

@@ -18,7 +18,7 @@ class Services:
     ends; a session at the other end of our own connection goes before. Answers and messages of others are not the rig's.
     """
 
-    def __init__(self, session):
+    def __init__(self, session: zenoh.Session):
         self._lock = threading.Lock()
         self._ready: set[str] = set()
         self._running: list[tuple[str, str]] = []
@@ -58,6 +58,11 @@ class Services:
         with self._lock:
             return self._believes(rig, instance)
 
+    def speaker(self, rig: str) -> str | None:
+        """The session that speaks for the rig; None while none does."""
+        with self._lock:
+            return self._speaker(rig)
+
     def _believes(self, rig: str, instance: str) -> bool | None:
         if (rig, instance) in self._believed:
             return True
@@ -67,7 +72,7 @@ class Services:
         running = [one for one in self._believed if one[0] == rig and one in self._running]
         return running[-1][1] if running else None
 
-    def _on_token(self, sample) -> None:
+    def _on_token(self, sample: zenoh.Sample) -> None:
         is_there = sample.kind == zenoh.SampleKind.PUT
         key = str(sample.key_expr)
         with self._lock:

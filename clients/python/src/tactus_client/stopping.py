@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import socket
 import time
@@ -12,7 +13,9 @@ from tactus_client import messages
 AGAIN_S = 0.05
 
 
-def stop_by_datagram(endpoint: str, rig: str | None, request, timeout_s: float):
+def stop_by_datagram(
+    endpoint: str, rig: str | None, request: messages.CommandRequest, timeout_s: float
+) -> messages.CommandReply | None:
     """Sends a stop until it is answered, and returns the ``CommandReply``; None if nobody takes datagrams there.
 
     A service on ``tcp/HOST:PORT`` on this machine takes them at the same port, one on a Unix socket at ``PATH.stop``.
@@ -35,15 +38,7 @@ def stop_by_datagram(endpoint: str, rig: str | None, request, timeout_s: float):
     return None
 
 
-class _NoSocket:
-    def __enter__(self):
-        return None
-
-    def __exit__(self, *_):
-        pass
-
-
-def _socket(endpoint: str):
+def _socket(endpoint: str) -> contextlib.AbstractContextManager[socket.socket | None]:
     if endpoint.startswith("unixsock-stream/"):
         made = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         # A name without a file, for the answer.
@@ -52,7 +47,7 @@ def _socket(endpoint: str):
         return made
     match = re.fullmatch(r"tcp/(?:\[(::1)\]|(127\.[0-9.]+|localhost)):(\d+)", endpoint)
     if not match:
-        return _NoSocket()
+        return contextlib.nullcontext()
     host, port = match[1] or match[2], int(match[3])
     family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
     made = socket.socket(family, socket.SOCK_DGRAM)

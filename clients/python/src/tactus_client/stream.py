@@ -6,6 +6,8 @@ import threading
 import time
 import weakref
 from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar
 
 import zenoh
 import zenoh.ext
@@ -13,29 +15,36 @@ import zenoh.ext
 from tactus_client import messages
 from tactus_client.merge import Merge, Numbered
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 #: How long to wait for past messages. Those that arrive later are not used.
 PAST_TIMEOUT_S = 10.0
 #: Time between two looks at whether a service has announced itself.
 ANNOUNCED_S = 0.05
 
 
-class Stream:
+M = TypeVar("M")
+#: Tells whether a session on the bus speaks for the rig; None while none does.
+Believes = Callable[[str], Optional[bool]]
+
+
+class Stream(Generic[M]):
     """Iterates over the messages of one topic, and waits for each.
 
     A lost message is fetched again if the service still keeps it. At most ``capacity`` messages wait to be read.
     If there are more, the oldest is dropped and counted in ``overrun``.
     """
 
-    def __init__(self, session, key: str, message_class, history: int | None, capacity: int, believes):
-        """``history``: the number of past messages to start with; None for all that the service keeps.
-
-        ``believes`` tells whether a session speaks for the rig; None while none does.
-        """
+    def __init__(
+        self, session: zenoh.Session, key: str, message_class: Any, history: int | None, capacity: int, believes: Believes
+    ):
+        """``history``: the number of past messages to start with; None for all that the service keeps."""
         self._believes = believes
         self._message_class = message_class
         self._encoding = messages.encoding(message_class)
         self._capacity = capacity
-        self._arrived: deque = deque()
+        self._arrived: deque[Any] = deque()
         self._changed = threading.Condition()
         self._closed = False
         self._merge = Merge(self._keep)
@@ -50,10 +59,11 @@ class Stream:
         # Direct: an indirect callback has a thread, for whose end Python waits before it lets anybody close the session. Weak: a
         # stream that nobody has any more ends.
         hear, end = weakref.WeakMethod(self._hear), weakref.WeakMethod(self._end)
-        self._subscriber = zenoh.ext.declare_advanced_subscriber(
+        callback: Any = zenoh.handlers.Callback(lambda sample: _call(hear, sample), lambda: _call(end), indirect=False)
+        self._subscriber: Any = zenoh.ext.declare_advanced_subscriber(
             session,
             f"{key}$*",
-            zenoh.handlers.Callback(lambda sample: _call(hear, sample), lambda: _call(end), indirect=False),
+            callback,
             recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
         )
         # Request the past only after subscribing, so that no message is lost in between.
@@ -61,7 +71,7 @@ class Stream:
         with self._changed:
             self._merge.join(past)
 
-    def receive(self, timeout_s: float | None = None):
+    def receive(self, timeout_s: float | None = None) -> M | None:
         """The next message; None once the stream is closed, or after ``timeout_s`` seconds without one."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
@@ -76,48 +86,51 @@ class Stream:
             if not is_own:
                 self.foreign += 1
                 continue
-            message = self._decode(sample)
+            message: M | None = self._decode(sample)
             if message is not None:
                 return message
 
     def close(self) -> None:
         """Stops listening; messages that have arrived can still be read."""
         self._end()
-        self._subscriber.undeclare()
+        subscriber, self._subscriber = self._subscriber, None
+        if subscriber is not None:
+            subscriber.undeclare()
 
-    def __iter__(self):
+    def __iter__(self) -> Self:
         return self
 
-    def __next__(self):
+    def __next__(self) -> M:
         message = self.receive()
         if message is None:
             raise StopIteration
         return message
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _is_own(self, sample) -> bool | None:
+    def _is_own(self, sample: Any) -> bool | None:
         source = sample.source_info
         return False if source is None else self._believes(str(source.source_id.zid))
 
-    def _decode(self, sample):
+    def _decode(self, sample: Any) -> M | None:
         try:
             if str(sample.encoding) == self._encoding:
-                return self._message_class.FromString(sample.payload.to_bytes())
+                message: M = self._message_class.FromString(sample.payload.to_bytes())
+                return message
         except messages.DecodeError:
             pass
         self.unreadable += 1
         return None
 
-    def _hear(self, sample) -> None:
+    def _hear(self, sample: Any) -> None:
         with self._changed:
             self._merge.present(_numbered(sample))
 
-    def _keep(self, sample) -> None:
+    def _keep(self, sample: Any) -> None:
         if len(self._arrived) == self._capacity:
             self._arrived.popleft()
             self.overrun += 1
@@ -130,13 +143,13 @@ class Stream:
             self._changed.notify_all()
 
 
-def _call(method: weakref.WeakMethod, *arguments) -> None:
+def _call(method: weakref.WeakMethod[Any], *arguments: Any) -> None:
     alive = method()
     if alive is not None:
         alive(*arguments)
 
 
-def past_samples(session, key: str, history: int | None):
+def past_samples(session: zenoh.Session, key: str, history: int | None) -> list[Any]:
     """The messages that the topic's publishers still keep. Each answers on one of zenoh's keys below the topic."""
     limit = "" if history is None else f"?_max={history}"
     replies = session.get(
@@ -149,7 +162,7 @@ def past_samples(session, key: str, history: int | None):
     return [reply.ok for reply in replies if reply.ok is not None]
 
 
-def _numbered(sample) -> Numbered:
+def _numbered(sample: Any) -> Numbered:
     source = sample.source_info
     if source is None:
         return Numbered(None, None, sample)
