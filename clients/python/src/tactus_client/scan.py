@@ -7,14 +7,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Metadata, Schema
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.records import Attachment, Channel, Chunk, Metadata, Schema
+from mcap.stream_reader import get_chunk_data_stream
+from mcap.writer import MCAP0_MAGIC
+from zstandard import ZstdError
 
 from tactus_client import messages
 from tactus_client.errors import UnreadableRecording
@@ -23,9 +26,13 @@ from tactus_client.errors import UnreadableRecording
 METADATA_NAME = "tactus.run"
 #: No record of a recording is longer; a length beyond it is damage.
 RECORD_MAX_BYTES = 64 * 1024 * 1024
-#: A record's kind and length; in a message's record also channel, number and two times.
+#: A record's kind and length; within a chunk the number of a channel or a schema always follows.
 RECORD_HEAD = struct.Struct("<BQ")
-MESSAGE_HEAD = struct.Struct("<HIQQ")
+INNER_HEAD = struct.Struct("<BQH")
+#: Channel, number and two times of a message.
+MESSAGE_HEAD_BYTES = 22
+#: What the readers of damaged records raise.
+DAMAGE = (McapError, ZstdError, ValueError, struct.error)
 
 FRAME_COLUMNS = np.dtype(
     [
@@ -84,20 +91,20 @@ def read_head(path: Path) -> Head:
     run: dict[str, str] = {}
     attachments: dict[str, bytes] = {}
     problem = "it does not say which run it is"
-    try:
-        with path.open("rb") as file:
-            for record in _records(file):
-                if isinstance(record, Metadata) and record.name == METADATA_NAME:
-                    run = dict(record.metadata)
-                elif isinstance(record, Attachment):
-                    attachments[record.name] = record.data
-                elif isinstance(record, Chunk):
+    with path.open("rb") as file:
+        try:
+            for opcode, body in _records(file):
+                if opcode == Opcode.METADATA:
+                    record = Metadata.read(_stream(body))
+                    if record.name == METADATA_NAME:
+                        run = record.metadata
+                elif opcode == Opcode.ATTACHMENT:
+                    attachment = Attachment.read(_stream(body))
+                    attachments[attachment.name] = attachment.data
+                elif opcode == Opcode.CHUNK:
                     break
-    except OSError:
-        raise
-    except Exception as error:
-        # The reader of a damaged file may raise anything.
-        problem = f"{type(error).__name__}: {error}"
+        except (_Cut, *DAMAGE) as error:
+            problem = str(error)
     if not run.get("run_id") or "rig.json" not in attachments:
         raise UnreadableRecording(f"{path} is not the recording of a run, or is damaged at its start ({problem}); try `tactus recover`")
     return Head(run, attachments)
@@ -108,30 +115,42 @@ def read_contents(path: Path, elements: int) -> Contents:
     scan = _Scan(elements)
     at_byte, cut = 0, ""
     with path.open("rb") as file:
-        records = _records(file)
-        while True:
-            try:
-                record = next(records, None)
-            except OSError:
-                raise
-            except Exception as error:
-                # The reader of a damaged file may raise anything.
-                cut = f"readable up to byte {at_byte}: {_in_words(error)}"
-                break
-            if record is None:
-                break
-            scan.take(record)
-            at_byte = file.tell()
+        try:
+            for opcode, body in _records(file):
+                scan.take(opcode, body)
+                at_byte = file.tell()
+        except _Cut as error:
+            cut = f"readable up to byte {at_byte}: {error}"
     return scan.contents(cut)
 
 
-def _records(file: Any) -> Iterator[McapRecord]:
-    return iter(StreamReader(file, emit_chunks=True, record_size_limit=RECORD_MAX_BYTES).records)
+class _Cut(Exception):
+    """Why nothing can be read from here on."""
 
 
-def _in_words(error: Exception) -> str:
-    text = str(error)
-    return "the file ends here, without its end mark" if type(error).__name__ in ("EndOfFile", "error") else text or type(error).__name__
+def _records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """The kind and the body of each record."""
+    if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+        raise _Cut("the start mark is wrong")
+    while True:
+        head = file.read(RECORD_HEAD.size)
+        if len(head) < RECORD_HEAD.size:
+            raise _Cut("the file ends here, without its end mark")
+        opcode, length = RECORD_HEAD.unpack(head)
+        if opcode == 0 or Opcode.DATA_END < opcode < 128 or length > RECORD_MAX_BYTES:
+            raise _Cut(f"there is no record of kind {opcode} that is {length} bytes long")
+        body = file.read(length)
+        if len(body) < length:
+            raise _Cut("the file ends here, within a record")
+        yield opcode, body
+        if opcode == Opcode.FOOTER:
+            if file.read() != MCAP0_MAGIC:
+                raise _Cut("the end mark is wrong")
+            return
+
+
+def _stream(body: bytes) -> ReadDataStream:
+    return ReadDataStream(BytesIO(body))
 
 
 @dataclass
@@ -149,37 +168,39 @@ class _Scan:
     _safety: list[Any] = field(default_factory=list)
     _tick_ns: int = 0
 
-    def take(self, record: McapRecord) -> None:
-        if isinstance(record, Schema):
-            self._schemas[record.id] = record.name.rpartition(".")[2]
-        elif isinstance(record, Channel):
-            self._kinds[record.id] = self._schemas.get(record.schema_id, "")
-        elif isinstance(record, Chunk):
-            try:
-                stream, length = get_chunk_data_stream(record, validate_crc=True)
-            except Exception:
-                # It does not unpack, or its checksum is wrong: no message is better than a wrong one.
-                self.lost_chunks += 1
-            else:
-                self._records(stream.read(length))
+    def take(self, opcode: int, body: bytes) -> None:
+        """Takes what a record has of messages; a damaged one has none."""
+        try:
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(_stream(body))
+                self._schemas[schema.id] = schema.name.rpartition(".")[2]
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(_stream(body))
+                self._kinds[channel.id] = self._schemas.get(channel.schema_id, "")
+            elif opcode == Opcode.CHUNK:
+                # If its checksum is wrong it gives nothing: no message is better than a wrong one.
+                chunk = Chunk.read(_stream(body))
+                if chunk.uncompressed_size > RECORD_MAX_BYTES:
+                    raise ValueError("no chunk is so long")
+                stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+                self._within(stream.read(length))
+        except DAMAGE:
+            self.lost_chunks += 1
 
-    def _records(self, data: bytes) -> None:
+    def _within(self, data: bytes) -> None:
         """Takes the records within a chunk."""
         at = 0
         while at < len(data):
-            opcode, length = RECORD_HEAD.unpack_from(data, at)
+            opcode, length, channel = INNER_HEAD.unpack_from(data, at)
             body = at + RECORD_HEAD.size
             at = body + length
             if opcode == Opcode.MESSAGE:
-                channel = MESSAGE_HEAD.unpack_from(data, body)[0]
                 try:
-                    self._message(self._kinds.get(channel), data[body + MESSAGE_HEAD.size : at])
+                    self._message(self._kinds.get(channel), data[body + MESSAGE_HEAD_BYTES : at])
                 except messages.DecodeError:
                     self.malformed += 1
-            elif opcode == Opcode.SCHEMA:
-                self.take(Schema.read(ReadDataStream(BytesIO(data[body:at]))))
-            elif opcode == Opcode.CHANNEL:
-                self.take(Channel.read(ReadDataStream(BytesIO(data[body:at]))))
+            elif opcode != Opcode.CHUNK:
+                self.take(opcode, data[body:at])
 
     def _message(self, kind: str | None, message: bytes) -> None:
         if kind == "Frame":
