@@ -93,7 +93,8 @@ class Stream(Generic[M]):
     def close(self) -> None:
         """Stops listening; messages that have arrived can still be read."""
         self._end()
-        subscriber, self._subscriber = self._subscriber, None
+        with self._changed:
+            subscriber, self._subscriber = self._subscriber, None
         if subscriber is not None:
             subscriber.undeclare()
 
