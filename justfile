@@ -126,15 +126,17 @@ vm *checks: programs
 vm-slice: build
     TACTUS_BINARIES={{ justfile_directory() }}/target/debug tests/vm/run.sh enumeration streaming
 
-# Stock Python tools read our recordings, tables and bus.
+# Stock Python tools read our recordings, tables and bus; the Python client, its types, notebook and devices.
 python: build python-tools
+    {{ venv }}/bin/ruff check --quiet clients/python
+    {{ venv }}/bin/mypy --config-file clients/python/pyproject.toml clients/python/src/tactus_client
     {{ venv }}/bin/pytest -q tests/python
     TACTUS_PULSE=$PWD/target/debug/examples/pulse {{ venv }}/bin/pytest -q clients/python/tests
 
 # A virtual environment with the stock tools.
 python-tools:
     test -d {{ venv }} || python3 -m venv {{ venv }}
-    {{ venv }}/bin/pip install --quiet --requirement tests/python/requirements.txt --editable clients/python
+    {{ venv }}/bin/pip install --quiet --no-compile --requirement tests/python/requirements.txt --editable 'clients/python[all]'
 
 # Runs the programs of `examples/`, and plans every shipped experiment.
 examples: build

@@ -1,6 +1,6 @@
 """Writes ``messages.pyi``, the types of the messages, from the descriptors in the package: after `cargo xtask proto`.
 
-    python clients/python/make_stub.py
+python clients/python/make_stub.py
 """
 
 import keyword

@@ -150,9 +150,7 @@ class Client:
         reply = self._command("experiments", messages.CommandRequest(who=_who()), timeout_s)
         return Experiments({one.name: Experiment.of(one) for one in reply.experiments})
 
-    def plan(
-        self, experiment: str | os.PathLike[str], /, *, seed: int | None = None, timeout_s: float = 300.0, **parameters: Any
-    ) -> Plan:
+    def plan(self, experiment: str | os.PathLike[str], /, *, seed: int | None = None, timeout_s: float = 300.0, **parameters: Any) -> Plan:
         """Does an experiment on the simulated twin of the rig, as ``run`` would; nothing moves, and no lease is wanted.
 
         Raises ``Refused`` if there is no such experiment or parameter, ``NoAnswer``.
@@ -161,9 +159,7 @@ class Client:
         reply = self._command("plan", messages.RunRequest(who=_who(), **fields), timeout_s)
         return Plan.of(fields["experiment"], reply.plan)
 
-    def run(
-        self, experiment: str | os.PathLike[str], /, *, seed: int | None = None, timeout_s: float = 300.0, **parameters: Any
-    ) -> Run:
+    def run(self, experiment: str | os.PathLike[str], /, *, seed: int | None = None, timeout_s: float = 300.0, **parameters: Any) -> Run:
         """Starts an experiment that the service knows by name, or a script of this machine: ``"mine.star"``, or any ``Path``.
 
         Parameters are those that the script declares: truth values, numbers, texts, lists of numbers, or numpy's. This returns after

@@ -41,7 +41,11 @@ class RunFailed(TactusError):
     """A run ended without doing what it should. ``str()`` says why; ``result`` is how it ended, with the path of its recording."""
 
     def __init__(self, result: Result):
-        super().__init__(f"run {result.run_id} was {result.exit_status}: {result.message}" if result.message else f"run {result.run_id}: {result.exit_status}")
+        super().__init__(
+            f"run {result.run_id} was {result.exit_status}: {result.message}"
+            if result.message
+            else f"run {result.run_id}: {result.exit_status}"
+        )
         self.result = result
 
 

@@ -122,9 +122,7 @@ class FrameStream(Stream[Any]):
     #: Frames that may wait to be read: 5 minutes at 30 Hz.
     CAPACITY = 9_000
 
-    def __init__(
-        self, session: zenoh.Session, key: str, history: int | None, shape: tuple[int, int] | None, believes: Believes
-    ):
+    def __init__(self, session: zenoh.Session, key: str, history: int | None, shape: tuple[int, int] | None, believes: Believes):
         self._shape = shape
         self.tally = Tally()
         super().__init__(session, key, messages.Frame, history, self.CAPACITY, believes)

@@ -18,9 +18,7 @@ PACKAGE = "tactus.v1"
 def _load():
     # A separate pool: other packages may bring other versions of the same messages.
     pool = descriptor_pool.DescriptorPool()
-    files = descriptor_pb2.FileDescriptorSet.FromString(
-        resources.files(__package__).joinpath("tactus.binpb").read_bytes()
-    )
+    files = descriptor_pb2.FileDescriptorSet.FromString(resources.files(__package__).joinpath("tactus.binpb").read_bytes())
     classes = {}
     for file in files.file:
         pool.AddSerializedFile(file.SerializeToString())

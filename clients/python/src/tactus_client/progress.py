@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+
 from tactus_client import messages
 
 WIDTH = 24

@@ -386,7 +386,13 @@ class Runs(list[Recording]):
 
     def _repr_html_(self) -> str:
         rows = [
-            (run.run_id, run.experiment, run._head.run.get("rig", ""), f"{run.started:%Y-%m-%d %H:%M}", "SIMULATED" if run.simulated else "")
+            (
+                run.run_id,
+                run.experiment,
+                run._head.run.get("rig", ""),
+                f"{run.started:%Y-%m-%d %H:%M}",
+                "SIMULATED" if run.simulated else "",
+            )
             for run in self
         ]
         return html.table(("run", "experiment", "rig", "started, UTC", ""), rows)
@@ -402,7 +408,9 @@ def _folder(folder: str | os.PathLike[str] | None) -> Path:
     else:
         found = next((one for one in FOLDERS if one.is_dir()), FOLDERS[0])
     if not found.is_dir():
-        raise FileNotFoundError(f"there is no folder {found}: name the folder of the recordings; the installed service records in {FOLDERS[1]}")
+        raise FileNotFoundError(
+            f"there is no folder {found}: name the folder of the recordings; the installed service records in {FOLDERS[1]}"
+        )
     return found
 
 

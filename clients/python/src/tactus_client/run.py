@@ -6,7 +6,7 @@ import time
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tactus_client import html, messages
 from tactus_client.errors import NoAnswer, RunAborted, RunFailed, RunRefused, RunStopped

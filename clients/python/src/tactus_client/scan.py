@@ -48,9 +48,7 @@ FRAME_COLUMNS = np.dtype(
         ("tick_ns", "u8"),
     ]
 )
-STAGE_COLUMNS = np.dtype(
-    [("t_mono_ns", "i8"), ("x_mm", "f8"), ("y_mm", "f8"), ("z_mm", "f8"), ("status", "u1"), ("simulated", "?")]
-)
+STAGE_COLUMNS = np.dtype([("t_mono_ns", "i8"), ("x_mm", "f8"), ("y_mm", "f8"), ("z_mm", "f8"), ("status", "u1"), ("simulated", "?")])
 
 
 @dataclass(frozen=True)

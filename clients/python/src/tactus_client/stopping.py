@@ -13,9 +13,7 @@ from tactus_client import messages
 AGAIN_S = 0.05
 
 
-def stop_by_datagram(
-    endpoint: str, rig: str | None, request: messages.CommandRequest, timeout_s: float
-) -> messages.CommandReply | None:
+def stop_by_datagram(endpoint: str, rig: str | None, request: messages.CommandRequest, timeout_s: float) -> messages.CommandReply | None:
     """Sends a stop until it is answered, and returns the ``CommandReply``; None if nobody takes datagrams there.
 
     A service on ``tcp/HOST:PORT`` on this machine takes them at the same port, one on a Unix socket at ``PATH.stop``.

@@ -36,9 +36,7 @@ class Stream(Generic[M]):
     If there are more, the oldest is dropped and counted in ``overrun``.
     """
 
-    def __init__(
-        self, session: zenoh.Session, key: str, message_class: Any, history: int | None, capacity: int, believes: Believes
-    ):
+    def __init__(self, session: zenoh.Session, key: str, message_class: Any, history: int | None, capacity: int, believes: Believes):
         """``history``: the number of past messages to start with; None for all that the service keeps."""
         self._believes = believes
         self._message_class = message_class

@@ -196,4 +196,3 @@ def phase_names(phase: Array) -> Array:
     """Names of phases by their index."""
     names: Array = np.array(PHASES, dtype=object)[phase]
     return names
-
