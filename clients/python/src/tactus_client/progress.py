@@ -56,7 +56,8 @@ class Progress:
 
 def _is_notebook() -> bool:
     """True in a kernel of a notebook, whose standard error is no terminal but shows lines."""
-    return "ipykernel" in sys.modules
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
 
 def _minutes(seconds: float) -> str:
