@@ -154,6 +154,22 @@ def test_any_cut_gives_frames_or_an_error_that_says_what_to_do(runs, at, tmp_pat
         assert run.completeness.startswith("readable up to byte")
 
 
+def test_no_damage_at_the_start_goes_unnoticed(runs, tmp_path):
+    whole = runs["a change of covering"].read_bytes()
+    path = tmp_path / "recording.mcap"
+    told = (recorded := tactus_client.open(runs["a change of covering"])).metadata
+    start = whole.index(b"rig.json") + 2_000
+    for at in range(8, start, 211):
+        path.write_bytes(flipped(whole, at))
+        try:
+            damaged = tactus_client.open(path)
+        except tactus_client.UnreadableRecording:
+            continue
+        assert damaged.rig == recorded.rig
+        same = (damaged.parameters, damaged.script, damaged.metadata) == (recorded.parameters, recorded.script, told)
+        assert same or damaged.warnings, at
+
+
 def test_a_run_is_found_by_path_folder_id_and_part_of_an_id(runs):
     path = runs["a change of covering"]
     run_id, folder = path.parent.name, path.parent.parent

@@ -47,7 +47,7 @@ def connect(endpoint: str | None = None, rig: str | None = None) -> Client:
     Raises ``NoService`` at once if nothing listens there, ``NoRig`` if no rig is ready, or if several are ready and
     none was named, and ``ValueError`` if the endpoint or the rig's name is not valid.
     """
-    rig = os.environ.get("TACTUS_RIG") if rig is None else rig
+    rig = os.environ.get("TACTUS_RIG") or None if rig is None else rig
     _check_rig_name(rig)
     endpoint = _of_this_machine() if endpoint is None else endpoint
     _reach(endpoint)
@@ -74,7 +74,7 @@ def stop(
     It needs no connection where the service is on this machine. Returns the ``CommandReply`` of a service. Raises
     ``NoAnswer`` if none answered: then nothing is known.
     """
-    rig = os.environ.get("TACTUS_RIG") if rig is None else rig
+    rig = os.environ.get("TACTUS_RIG") or None if rig is None else rig
     _check_rig_name(rig)
     endpoint = _of_this_machine() if endpoint is None else endpoint
     request = messages.CommandRequest(who=_who(), reason=reason, abort=abort)

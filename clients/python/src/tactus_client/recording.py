@@ -117,6 +117,9 @@ class Recording:
     def warnings(self) -> list[str]:
         """What readers of the numbers should know, a sentence each; empty if there is nothing."""
         found = [] if self.completeness == "complete" else [f"the recording is {self.completeness}"]
+        lacks = {self._head.run.get("script", ""), "parameters.json", "versions.json"} - set(self.attachments)
+        if lacks:
+            found.append(f"the recording lacks {', '.join(sorted(lacks))}: it is damaged there")
         if self.exit_status is None:
             found.append("the run has no end: its service died, or it is still in progress")
         if self.metadata["frames_missing"]:
@@ -141,9 +144,9 @@ class Recording:
         received = finished.frames if finished is not None else 0
         dwells = [event.dwell_done for event in self._contents.events if event.WhichOneof("event") == "dwell_done"]
         of_presses = {(dwell.press, dwell.dwell) for dwell in dwells if dwell.press >= 0}
-        times = [*frames["t_mono_ns"][[0, -1]]] if len(frames) else []
-        times += [event.t_mono_ns for event in self._contents.events]
-        times += [*self._contents.stage["t_mono_ns"], *(event.t_mono_ns for event in self._contents.safety)]
+        times = [event.t_mono_ns for event in (*self._contents.events, *self._contents.safety)]
+        for column in (frames["t_mono_ns"], self._contents.stage["t_mono_ns"]):
+            times += [column.min(), column.max()] if len(column) else []
         return {
             "run_id": self.run_id,
             "experiment": self.experiment,
@@ -371,12 +374,13 @@ class Runs(list[Recording]):
     """Recordings in the order of their start; a table in a notebook. Made by ``tactus_client.runs``."""
 
     def __init__(self, folder: Path):
-        found, self.unreadable = [], {}
+        found = []
+        #: Files that are not recordings of runs, and why.
+        self.unreadable: dict[Path, str] = {}
         for path in _files(folder, DEPTH_MAX):
             try:
                 found.append(Recording(path))
             except (OSError, ValueError) as error:
-                #: Files that are not recordings of runs, and why.
                 self.unreadable[path] = str(error)
         super().__init__(sorted(found, key=lambda run: (run.started, run.run_id)))
         self.folder = folder

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -95,8 +96,10 @@ def read_head(path: Path) -> Head:
                 if opcode == Opcode.METADATA:
                     record = Metadata.read(_stream(body))
                     if record.name == METADATA_NAME:
-                        run = record.metadata
+                        run = _checked(record.metadata)
                 elif opcode == Opcode.ATTACHMENT:
+                    if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
+                        raise ValueError("the checksum of an attached file is wrong")
                     attachment = Attachment.read(_stream(body))
                     attachments[attachment.name] = attachment.data
                 elif opcode == Opcode.CHUNK:
@@ -120,6 +123,16 @@ def read_contents(path: Path, elements: int) -> Contents:
         except _Cut as error:
             cut = f"readable up to byte {at_byte}: {error}"
     return scan.contents(cut)
+
+
+def _checked(metadata: dict[str, str]) -> dict[str, str]:
+    """The metadata without its checksum, which is over the lengths and texts of all other fields: MCAP has none for it."""
+    fields = {name: value for name, value in metadata.items() if name != "crc32"}
+    texts = [text.encode() for field in sorted(fields.items()) for text in field]
+    checksum = zlib.crc32(b"".join(len(text).to_bytes(8, "little") + text for text in texts))
+    if metadata.get("crc32", f"{checksum:08x}") != f"{checksum:08x}":
+        raise ValueError("the checksum of the run's metadata is wrong")
+    return fields
 
 
 class _Cut(Exception):
