@@ -167,9 +167,10 @@ browser-tools:
     test -d {{ tools }}/browser || python3 -m venv {{ tools }}/browser
     {{ tools }}/browser/bin/pip install --quiet --requirement tests/browser/requirements.txt
 
-# The messages, after a change of tactus.proto.
-proto:
+# The messages, after a change of tactus.proto, and their types in Python.
+proto: python-tools
     cargo xtask proto
+    {{ venv }}/bin/python clients/python/make_stub.py
 
 # The made tools as STL, after a change of their shapes.
 assets:
