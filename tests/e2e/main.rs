@@ -11,6 +11,7 @@ mod discover;
 mod disk;
 mod effects;
 mod embedded;
+mod import;
 mod kill_trials;
 mod link;
 mod runs;

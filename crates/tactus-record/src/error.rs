@@ -102,7 +102,7 @@ pub enum RowsError {
     #[error("no recording or measurement table was named")]
     Nothing,
     /// The file is of another kind.
-    #[error("{} is neither a recording (MCAP) nor a measurement table (Parquet): only these hold measured rows", path.display())]
+    #[error("{} is neither a recording (MCAP) nor a measurement table (Parquet): only these hold measured rows. `tactus import` makes a table of another file", path.display())]
     Neither { path: PathBuf },
     /// A recording could not be read.
     #[error(transparent)]

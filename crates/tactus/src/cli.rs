@@ -92,6 +92,8 @@ enum CliCommand {
     Record(RecordCommand),
     /// Write the measurement table of recordings as .parquet, .csv or .npz.
     Export(ExportArgs),
+    /// Make a measurement table of a lab's own .csv, .npz or .mcap files, by a mapping of their columns.
+    Import(ImportArgs),
     /// Repair a recording that was cut off or is damaged.
     Recover(RecoverArgs),
     /// Write the report of a recording.
@@ -420,6 +422,23 @@ pub(crate) struct ExportArgs {
     /// Format of the table; default: as the name of the file ends. Tactus itself reads Parquet only.
     #[arg(long, value_name = "FORMAT", value_parser = ["parquet", "csv", "npz"])]
     pub(crate) format: Option<String>,
+}
+
+/// Arguments of `import`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ImportArgs {
+    /// .csv, .tsv, .txt, .npz or .mcap (JSON messages) files with the same columns.
+    #[arg(required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// The mapping: which column is what, in which unit.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) map: Option<PathBuf>,
+    /// Write a mapping to start from, by the columns of the first file. Lines that begin with `#?` are questions.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["map", "out"])]
+    pub(crate) new_map: Option<PathBuf>,
+    /// The table to write; default: .parquet beside the first file.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// Arguments of `recover`.
@@ -763,6 +782,7 @@ fn dispatch(common: &Common, command: CliCommand) -> anyhow::Result<Exit> {
         CliCommand::Rerun(args) => commands::runs::rerun(common, &args),
         CliCommand::Record(RecordCommand::Info { files }) => commands::files::info(common, &files),
         CliCommand::Export(args) => commands::files::export(common, &args),
+        CliCommand::Import(args) => commands::import::import(common, &args),
         CliCommand::Recover(args) => commands::files::recover(common, &args),
         CliCommand::Report(args) => commands::files::report(common, &args),
         CliCommand::Calibrate(args) => commands::calibrate::calibrate(common, &args),

@@ -9,6 +9,7 @@ pub(crate) mod effects;
 pub(crate) mod experiments;
 pub(crate) mod figures;
 pub(crate) mod files;
+pub(crate) mod import;
 pub(crate) mod library;
 pub(crate) mod link;
 pub(crate) mod plan;

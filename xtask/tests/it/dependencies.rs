@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 28] = [
+const ROWS: [&str; 29] = [
     "tactus-model",
     "tactus-solid",
     "tactus-scene",
@@ -19,6 +19,7 @@ const ROWS: [&str; 28] = [
     "tactus-device",
     "tactus-engine",
     "tactus-record",
+    "tactus-import",
     "tactus-report",
     "tactus-bus",
     "tactus-log",

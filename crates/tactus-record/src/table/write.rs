@@ -92,7 +92,7 @@ impl TableWriter {
     }
 
     /// Removes what was written so far.
-    pub(crate) fn abandon(self) {
+    pub fn abandon(self) {
         self.part.abandon();
     }
 
