@@ -14,6 +14,7 @@ mod embedded;
 mod import;
 mod kill_trials;
 mod link;
+mod reports;
 mod runs;
 mod scripts;
 mod service;

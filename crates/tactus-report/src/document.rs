@@ -1,5 +1,7 @@
 //! The HTML document of every page, with inline style, and the parts that pages share.
 
+mod contents;
+
 use std::fmt;
 
 use tactus_model::Array;
@@ -46,8 +48,9 @@ pub(crate) fn sensor_header(
     writeln!(f, "</header>")
 }
 
-/// A complete page. The title is escaped; `body` is HTML.
+/// A complete page. The title is escaped; `body` is HTML. If it has many sections, their list stands below its header.
 pub(crate) fn document(title: impl fmt::Display, body: impl fmt::Display) -> String {
+    let body = contents::listed(body.to_string());
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\

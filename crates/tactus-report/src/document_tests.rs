@@ -20,3 +20,20 @@ fn titles_cells_and_notes_are_escaped() {
 fn no_notes_leave_no_heading() {
     assert_eq!(fmt::from_fn(|f| notes(f, "Notes", &[])).to_string(), "");
 }
+
+#[test]
+fn a_long_page_lists_its_sections() {
+    let of = |sections: usize| {
+        let section = |nth| format!("<section>\n<h2>Part {nth}</h2>\n</section>\n");
+        let sections: String = (0..sections).map(section).collect();
+        document("t", format!("<header>\n</header>\n<p>lead</p>\n{sections}"))
+    };
+    assert!(!of(5).contains("<nav"));
+    let page = of(6);
+    assert!(
+        page.contains("</header>\n<nav class=\"contents\">\n<a href=\"#section-0\">Part 0</a>\n"),
+        "{page}"
+    );
+    assert!(page.contains("</nav>\n<p>lead</p>\n<section id=\"section-0\">\n<h2>Part 0</h2>"), "{page}");
+    assert_eq!(page.matches("<a href").count(), 6);
+}

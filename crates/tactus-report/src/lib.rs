@@ -25,6 +25,7 @@ mod run;
 
 pub use page::render_html;
 pub use run::{
-    Baseline, DwellSummary, ElementCurve, FrameLoss, Intervals, LoggedEvent, PressSummary, ReportError,
-    RespondsTo, ResponseCurves, RunReport, RunSummary, Timing, Trace, UnresponsiveElement, run_report,
+    Baseline, Comparisons, Directions, DwellSummary, ElementCurve, FrameLoss, Intervals, Ladder, LoggedEvent,
+    PlaceMap, PressCurve, PressSummary, PressWay, ReportError, RespondsTo, ResponseCurves, RunReport,
+    RunSummary, Timing, Trace, UnresponsiveElement, run_report,
 };

@@ -1,5 +1,6 @@
 //! The HTML page of a run's report.
 
+mod comparisons;
 mod images;
 mod response;
 mod summary;
@@ -28,13 +29,24 @@ pub fn render_html(report: &RunReport) -> String {
     document(title, fmt::from_fn(|f| body(f, report)))
 }
 
+/// An element as reports name it: `element 18 (2, 2)`, with its row and column.
+struct Element(usize, usize);
+
+impl fmt::Display for Element {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(element, cols) = self;
+        write!(f, "element {element} ({}, {})", element / cols, element % cols)
+    }
+}
+
 fn body(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result {
     summary::header(f, &report.summary)?;
     notes(f, "", &report.notes)?;
     summary::facts(f, report)?;
     if let Some(response) = &report.response {
-        response::section(f, response)?;
+        response::section(f, response, &report.array)?;
     }
+    comparisons::sections(f, report)?;
     images::section(f, report)?;
     time::signal(f, report)?;
     time::losses(f, report)?;

@@ -1,7 +1,8 @@
 //! The data of a run's report, computed from its recording.
 
+mod comparisons;
 mod frames;
-mod log;
+pub(crate) mod log;
 mod presses;
 mod response;
 mod summary;
@@ -11,9 +12,10 @@ use std::path::Path;
 use tactus_model::Array;
 use tactus_record::{Completeness, RecordError, Timeline};
 
+pub use comparisons::{Comparisons, Directions, Ladder, PlaceMap, PressCurve};
 pub use frames::{FrameLoss, Intervals, Timing, Trace};
 pub use log::LoggedEvent;
-pub use presses::{Baseline, DwellSummary, PressSummary};
+pub use presses::{Baseline, DwellSummary, PressSummary, PressWay};
 pub use response::{ElementCurve, RespondsTo, ResponseCurves, UnresponsiveElement};
 pub use summary::RunSummary;
 
@@ -35,6 +37,8 @@ pub struct RunReport {
     pub baseline: Baseline,
     /// The response curves; `None` unless elements were pressed at their centres at several depths.
     pub response: Option<ResponseCurves>,
+    /// What the presses show when they are compared.
+    pub comparisons: Comparisons,
     /// Depth and signal over time.
     pub trace: Trace,
     /// Gaps in the sequence of frames.
@@ -78,6 +82,7 @@ pub fn run_report(recording: &Path) -> Result<RunReport, ReportError> {
         notes,
         array: timeline.rig().array.clone(),
         response,
+        comparisons: Comparisons::of(&presses.done, &frames.rest),
         trace: frames.trace(&timeline, &presses),
         timing: frames.timing(&timeline),
         events: log::events(&timeline, &frames),

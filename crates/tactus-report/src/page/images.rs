@@ -12,6 +12,8 @@ use crate::{
 const CELLS_MAX: usize = 40_000;
 /// Limit of drawn images.
 const IMAGES_MAX: usize = 300;
+/// What stands above an image without a place of its own.
+const LABELS: &str = "above each the element under the tip, if it was at a centre, and the depth in mm.";
 /// Height of a caption above an image.
 const CAPTION_PX: f64 = 13.0;
 
@@ -63,7 +65,7 @@ fn laid_out_like_the_array(report: &RunReport, scale: Scale) -> Option<(Mosaic<'
     for (element, press) in pressed {
         let (row, col) = (element / cols, element % cols);
         let corner = [col as f64 * step_px[0], (rows - 1 - row) as f64 * step_px[1]];
-        captions.push(([corner[0], corner[1] + CAPTION_PX - 4.0], format!("({row}, {col})")));
+        captions.push(([corner[0], corner[1] + CAPTION_PX - 4.0], format!("{element} ({row}, {col})")));
         for (nth, dwell) in press.dwells.iter().enumerate() {
             let at_px = [
                 corner[0] + (nth % across) as f64 * image_px[0],
@@ -73,8 +75,7 @@ fn laid_out_like_the_array(report: &RunReport, scale: Scale) -> Option<(Mosaic<'
         }
     }
     let lead = format!(
-        "{dwells} dwells. The presses are laid out like the array. Above each press is the (row, column) of the element at \
-         whose centre it was; below are its {most} images, row by row from the first dwell to the last."
+        "{dwells} dwells. The presses are laid out like the array. Above each press is the element at whose centre it was, with its (row, column); below are its {most} images, row by row from the first dwell to the last."
     );
     let size_px = [cols as f64 * step_px[0] - GAP_PX[0], rows as f64 * step_px[1]];
     Some((Mosaic { name: "Mean image of each dwell".into(), size_px, cell_px, scale, tiles, captions }, lead))
@@ -101,13 +102,15 @@ fn in_order(report: &RunReport, scale: Scale, dwells: usize) -> (Mosaic<'_>, Str
         let offset = (n as f64 * 0.618_034).fract();
         let Some(&(press, nth, dwell)) = all.get(chosen(n as f64 + offset, dwells, shown)) else { continue };
         let corner = [(n % across) as f64 * step_px[0], (n / across) as f64 * step_px[1]];
-        captions.push(([corner[0], corner[1] + CAPTION_PX - 3.0], format!("{:.3} mm", dwell.depth_mm)));
+        let element = press.element.map_or_else(|| "\u{2013}".to_owned(), |element| element.to_string());
+        let caption = format!("{element}: {:.3}", dwell.depth_mm);
+        captions.push(([corner[0], corner[1] + CAPTION_PX - 3.0], caption));
         tiles.push(tile([corner[0], corner[1] + CAPTION_PX], press, dwell, nth, [rows, cols]));
     }
     let lead = if shown < dwells {
-        format!("{shown} of {dwells} dwells, evenly chosen, in order of time; above each its depth.")
+        format!("{shown} of {dwells} dwells, evenly chosen, in order of time; {LABELS}")
     } else {
-        format!("All {dwells} dwells in order of time; above each its depth.")
+        format!("All {dwells} dwells in order of time; {LABELS}")
     };
     let size_px = [across.min(shown) as f64 * step_px[0], shown.div_ceil(across) as f64 * step_px[1]];
     (Mosaic { name: "Mean image of each dwell".into(), size_px, cell_px, scale, tiles, captions }, lead)

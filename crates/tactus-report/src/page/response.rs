@@ -2,18 +2,22 @@
 
 use std::fmt;
 
+use tactus_model::Array;
+
 use crate::{
     fit::{Coefficient, Polynomial},
     markup::Text,
-    numbers::{plural, with_error},
-    plot::{Axis, Figure, Ink, Series, number},
+    numbers::{count, plural, with_error},
+    plot::{Axis, ElementNumbers, Figure, HeatMap, Image, Ink, Scale, Series, Sheet, number},
     run::{RespondsTo, ResponseCurves},
 };
 
 /// Points along a fitted curve.
 const CURVE_POINTS: u32 = 60;
+/// Width of the array in the map of slopes.
+const MAP_PX: f64 = 300.0;
 
-pub(super) fn section(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {
+pub(super) fn section(f: &mut fmt::Formatter<'_>, response: &ResponseCurves, array: &Array) -> fmt::Result {
     writeln!(f, "<section>\n<h2>Response of the elements</h2>")?;
     writeln!(
         f,
@@ -32,8 +36,9 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> 
             last[0],
         )?;
     }
-    unresponsive(f, response)?;
+    unresponsive(f, response, array)?;
     spread(f, response)?;
+    slopes(f, response, array)?;
     writeln!(f, "</div>\n</div>")?;
     table(f, response)?;
     writeln!(f, "</section>")
@@ -74,17 +79,25 @@ fn elements(response: &ResponseCurves) -> usize {
     distinct.len()
 }
 
-fn unresponsive(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {
+fn unresponsive(f: &mut fmt::Formatter<'_>, response: &ResponseCurves, array: &Array) -> fmt::Result {
     if elements(response) < 2 && response.unresponsive.is_empty() {
         return Ok(());
     }
     untold(f, response)?;
     if response.unresponsive.is_empty() {
-        let told = elements(response) - response.untold.len();
-        return match (told, response.untold.is_empty()) {
+        let told = (elements(response) - response.untold.len()) as u64;
+        let (all, unpressed) = (array.elements() as u64, (array.elements() - elements(response)) as u64);
+        return match (told, unpressed) {
             (0, _) => Ok(()),
-            (_, true) => writeln!(f, "<p>Every pressed element responds to its own press.</p>"),
-            (_, false) => writeln!(f, "<p>Each other pressed element responds to its own press.</p>"),
+            (told, 0) if told == all => writeln!(f, "<p>Every element responds to its own press.</p>"),
+            (told, 0) => {
+                writeln!(f, "<p>The other {} respond to their own press.</p>", plural(told, "element"))
+            }
+            (told, unpressed) => writeln!(
+                f,
+                "<p>{} of {all} elements were seen to respond to their own press. {unpressed} were not pressed at their centre at several depths: of these this run says nothing.</p>",
+                count(told)
+            ),
         };
     }
     writeln!(
@@ -142,6 +155,36 @@ fn spread(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result 
         number(slope(&most), 0),
         most.place[0],
         most.place[1],
+    )
+}
+
+/// The array with the slope of each element and its number.
+fn slopes(f: &mut fmt::Formatter<'_>, response: &ResponseCurves, array: &Array) -> fmt::Result {
+    let (rows, cols) = (array.rows(), array.cols());
+    let cell_px = (MAP_PX / cols as f64).floor();
+    if elements(response) < 2 || cell_px < 1.0 {
+        return Ok(());
+    }
+    let mut values = vec![f32::NAN; array.elements()];
+    for curve in &response.curves {
+        if let (Some(value), Some(slope)) = (values.get_mut(curve.element), curve.slope_counts_per_mm()) {
+            #[expect(clippy::cast_possible_truncation, reason = "a colour")]
+            let slope = slope as f32;
+            *value = slope;
+        }
+    }
+    let finite = || values.iter().copied().filter(|slope| slope.is_finite()).map(f64::from);
+    let [least, most] = [finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max)];
+    let (scale, heat) = (Scale::new(least, most), HeatMap { values: &values, rows, cols });
+    let title = "slope of each element".to_owned();
+    let mut sheet = Sheet::new("Slope of each element", [cell_px * cols as f64, cell_px * rows as f64]);
+    sheet.put([0.0, 0.0], &Image { heat, cell_px, scale, title });
+    sheet.put([0.0, 0.0], &ElementNumbers { heat, cell_px, scale });
+    writeln!(
+        f,
+        "<figure>{sheet}<figcaption>The elements with their numbers; brighter is steeper, from {} to {} counts/mm.</figcaption></figure>",
+        number(least, 0),
+        number(most, 0)
     )
 }
 

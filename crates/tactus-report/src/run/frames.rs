@@ -3,12 +3,15 @@
 use std::path::Path;
 
 use tactus_record::{Entry, Message, Tally, Timeline, read};
-use tactus_schema::{DeviceTick, Frame, MonoTime, pb};
+use tactus_schema::{DeviceTick, Frame, MonoTime, pb, table::Phase};
 
 use super::{ReportError, presses::Presses};
 
 /// At most this many frames before the first press make a baseline: two seconds of the paper's sensor.
 const FIRST_FRAMES_MAX: u64 = 60;
+
+/// Above this height nothing touches the covering, even if the declared surface is wrong; a calibration asks for the same.
+const CLEAR_MM: f64 = 0.3;
 
 /// Depth and signal over time.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -63,6 +66,8 @@ pub(super) struct FrameStatistics {
     pub(super) safety: Vec<pb::SafetyEvent>,
     /// Time of sampling and sum of the raw counts.
     totals: Vec<(MonoTime, f64)>,
+    /// Time since the start and mean of the raw counts of frames at which nothing touched.
+    pub(super) rest: Vec<[f64; 2]>,
     first_sum: Vec<f64>,
     first_count: u64,
     /// True from the first frame of the first press on.
@@ -104,7 +109,12 @@ impl FrameStatistics {
 
     fn take(&mut self, timeline: &Timeline, frame: &Frame, lost: u64, previous: Option<&Previous>) {
         let at = timeline.sampling(frame).time();
-        self.totals.push((at, frame.counts.iter().map(|counts| f64::from(*counts)).sum()));
+        let total: f64 = frame.counts.iter().map(|counts| f64::from(*counts)).sum();
+        self.totals.push((at, total));
+        let is_clear = timeline.position_mm(at).is_some_and(|[_, _, z_mm]| z_mm >= CLEAR_MM);
+        if is_clear && timeline.phase(at).0 == Phase::Idle && total.is_finite() && !frame.counts.is_empty() {
+            self.rest.push([seconds(timeline, at), total / frame.counts.len() as f64]);
+        }
         self.baseline(timeline, frame, at);
         let Some(previous) = previous else { return };
         if lost > 0 {

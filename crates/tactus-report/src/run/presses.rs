@@ -9,7 +9,7 @@ use tactus_schema::{
     pb::{self, run_event::Event},
 };
 
-use super::frames::FrameStatistics;
+use super::frames::{FrameStatistics, seconds};
 
 /// A press within this distance of an element's centre, in pitches, counts as a press on that element.
 const CENTRE_PITCHES: f64 = 0.3;
@@ -23,13 +23,26 @@ pub struct PressSummary {
     pub at_mm: [f64; 2],
     /// The element whose centre is within 0.3 pitch.
     pub element: Option<usize>,
+    /// How the script asked the tip to come.
+    pub way: PressWay,
     /// The dwells in order of time.
     pub dwells: Vec<DwellSummary>,
+}
+
+/// How a script asked the tip to come.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PressWay {
+    /// Loading speed; `None` for the rig's.
+    pub speed_mm_per_s: Option<f64>,
+    /// From where beside the place; `None` from above.
+    pub from_mm: Option<[f64; 2]>,
 }
 
 /// The mean reading at one depth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DwellSummary {
+    /// When its average began, since the start of the run.
+    pub at_s: f64,
     /// Depth below the covering's nominal surface.
     pub depth_mm: f64,
     /// Thickness of the covering in place.
@@ -83,8 +96,16 @@ impl Presses {
         let baselines = Baselines::of(timeline, frames);
         let (mut baseline, mut malformed_dwells) = (Baseline::Tare, 0);
         let mut presses: BTreeMap<i32, PressSummary> = BTreeMap::new();
+        let mut way = PressWay::default();
         for event in timeline.events() {
-            let Some(Event::DwellDone(done)) = &event.event else { continue };
+            let done = match &event.event {
+                Some(Event::StepStarted(step)) => {
+                    way = PressWay::of_step(&step.step_json);
+                    continue;
+                }
+                Some(Event::DwellDone(done)) => done,
+                _ => continue,
+            };
             if done.press < 0 || void.contains(&done.press) {
                 continue;
             }
@@ -102,9 +123,11 @@ impl Presses {
                 index: done.press,
                 at_mm: [done.x_mm, done.y_mm],
                 element: element_at(array, [done.x_mm, done.y_mm]),
+                way,
                 dwells: Vec::new(),
             });
             press.dwells.push(DwellSummary {
+                at_s: seconds(timeline, at),
                 depth_mm: done.depth_mm,
                 covering_mm: timeline.covering_mm(at),
                 frames: done.frames,
@@ -117,6 +140,19 @@ impl Presses {
     /// Sum over all elements of the baseline at a time.
     pub(super) fn zero_total_counts(&self, at: MonoTime) -> f64 {
         self.baselines.at(at).0.iter().map(|counts| f64::from(*counts)).sum()
+    }
+}
+
+impl PressWay {
+    /// As a step's JSON says, [`pb::StepStarted::step_json`]; the default for other steps.
+    fn of_step(step_json: &str) -> Self {
+        let step: serde_json::Value = serde_json::from_str(step_json).unwrap_or_default();
+        let press = &step["Press"];
+        let from = &press["approach_from_mm"];
+        Self {
+            speed_mm_per_s: press["speed_mm_per_s"].as_f64(),
+            from_mm: from[0].as_f64().zip(from[1].as_f64()).map(<[f64; 2]>::from),
+        }
     }
 }
 
@@ -188,4 +224,10 @@ fn pitch_mm(array: &Array) -> f64 {
     };
     let least = apart(array.col_centres_mm()).min(apart(array.row_centres_mm()));
     if least.is_finite() { least } else { array.element_mm()[0] }
+}
+
+/// A length in micrometres: lengths that are equal to a reader have the same.
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+pub(super) fn key_of_mm(mm: f64) -> i64 {
+    (mm * 1e3).round() as i64
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tactus_schema::Rig;
 
-use super::presses::PressSummary;
+use super::presses::{PressSummary, key_of_mm};
 use crate::fit::Polynomial;
 
 /// An element is unresponsive if it reads less than this share of the median element at its own press.
@@ -15,8 +15,6 @@ const OWN_SHARE: f64 = 0.95;
 const NEAR: usize = 2;
 /// Elements that it takes to know which share of its own press an element reads at a neighbouring one.
 const SHARES_MIN: usize = 4;
-/// Depths are compared in multiples of this.
-const DEPTH_STEP_MM: f64 = 1e-3;
 
 /// The response curves of a run, and polynomials fitted to their mean.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,7 +125,7 @@ impl ElementCurve {
             dwell.rise_counts.get(element).map(|rise| [dwell.depth_mm, f64::from(*rise)])
         };
         let points: Vec<[f64; 2]> = press.dwells.iter().filter_map(own).collect();
-        let depths: BTreeSet<i64> = points.iter().map(|[depth_mm, _]| depth_key(*depth_mm)).collect();
+        let depths: BTreeSet<i64> = points.iter().map(|[depth_mm, _]| key_of_mm(*depth_mm)).collect();
         (depths.len() > 1).then(|| Self {
             element,
             place: [element / cols, element % cols],
@@ -167,7 +165,7 @@ impl<'a> CentreReadings<'a> {
         for press in presses {
             let Some(element) = press.element else { continue };
             for dwell in &press.dwells {
-                let depth = depth_key(dwell.depth_mm);
+                let depth = key_of_mm(dwell.depth_mm);
                 by_depth.entry(depth).or_default().entry(element).or_insert(&dwell.rise_counts);
                 let known = deepest.entry(element).or_insert((depth, &dwell.rise_counts));
                 if depth > known.0 {
@@ -269,18 +267,13 @@ fn rise(rises: &[f32], element: usize) -> f64 {
 fn mean(curves: &[ElementCurve]) -> Vec<[f64; 2]> {
     let mut by_depth: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
     for [depth_mm, rise] in curves.iter().flat_map(|curve| &curve.points) {
-        by_depth.entry(depth_key(*depth_mm)).or_default().push(*rise);
+        by_depth.entry(key_of_mm(*depth_mm)).or_default().push(*rise);
     }
     by_depth
         .into_iter()
         .filter(|(_, rises)| 2 * rises.len() >= curves.len())
-        .map(|(depth, rises)| [depth as f64 * DEPTH_STEP_MM, rises.iter().sum::<f64>() / rises.len() as f64])
+        .map(|(depth, rises)| [depth as f64 * 1e-3, rises.iter().sum::<f64>() / rises.len() as f64])
         .collect()
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "saturates")]
-fn depth_key(depth_mm: f64) -> i64 {
-    (depth_mm / DEPTH_STEP_MM).round() as i64
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@ use tactus_model::Array;
 use tactus_schema::Rig;
 
 use super::{RespondsTo, ResponseCurves};
-use crate::run::{DwellSummary, PressSummary};
+use crate::run::{DwellSummary, PressSummary, PressWay};
 
 const DEPTHS_MM: [f64; 5] = [0.2, 0.3, 0.4, 0.5, 0.6];
 
@@ -15,6 +15,7 @@ fn presses(rise: impl Fn(f64) -> f64, share: impl Fn(usize, usize) -> f64) -> Ve
     let array = rig().array;
     #[expect(clippy::cast_possible_truncation, reason = "readings are f32")]
     let dwell = |pressed: usize, depth_mm: f64| DwellSummary {
+        at_s: 0.0,
         depth_mm,
         covering_mm: 1.016,
         frames: 8,
@@ -25,6 +26,7 @@ fn presses(rise: impl Fn(f64) -> f64, share: impl Fn(usize, usize) -> f64) -> Ve
             index: i32::try_from(pressed).unwrap(),
             at_mm: array.centre_mm(pressed).unwrap(),
             element: Some(pressed),
+            way: PressWay::default(),
             dwells: DEPTHS_MM.map(|depth_mm| dwell(pressed, depth_mm)).to_vec(),
         })
         .collect()
