@@ -34,7 +34,7 @@ def lab(tmp_path_factory):
 @pytest.fixture(scope="session")
 def web(lab):
     """The address of the dashboard."""
-    process = lab.start("tactus-web", "--endpoint", lab.endpoint, "--listen", "127.0.0.1:0")
+    process = lab.start("tactus-web", "--endpoint", lab.endpoint, "--listen", "127.0.0.1:0", "--runs", str(lab.folder / "runs"))
     yield process.wait_for("http://").split()[-1]
     process.end()
 

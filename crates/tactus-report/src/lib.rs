@@ -7,6 +7,8 @@
 //! [`figures`] computes the paper's figures from the model. [`calibration`] reports a calibration, [`discovery`] the
 //! effects that a model was missing, [`study`] a repetition of the paper on one rig.
 //!
+//! [`viewer_file`] writes a recording for stock MCAP viewers.
+//!
 //! - [`fit`] fits polynomials by least squares, with standard errors.
 //! - [`plot`] draws figures and heat images as SVG; it does not depend on the reports.
 
@@ -22,6 +24,7 @@ mod markup;
 mod numbers;
 mod page;
 mod run;
+mod viewer;
 
 pub use page::render_html;
 pub use run::{
@@ -29,3 +32,4 @@ pub use run::{
     PlaceMap, PressCurve, PressSummary, PressWay, ReportError, RespondsTo, ResponseCurves, RunReport,
     RunSummary, Timing, Trace, UnresponsiveElement, run_report,
 };
+pub use viewer::{ViewerFile, viewer_file};

@@ -7,14 +7,24 @@ import { draw, duration, follow, lab } from "./lab.js";
 import { Frames, Log } from "./log.js";
 import { Place } from "./place.js";
 import { Run } from "./run.js";
+import { Runs } from "./runs.js";
 import { Move, Start } from "./start.js";
 import { Traces } from "./traces.js";
+
+/** Which part of the page is shown: the lab now, or the recorded runs. */
+let shown = "lab";
+
+function Way({ to, children }) {
+  const go = () => { shown = to; draw(); };
+  return html`<button id=${`to-${to}`} class="way" type="button" aria-current=${shown === to ? "page" : undefined} onClick=${go}>${children}</button>`;
+}
 
 function Head() {
   const { rig, simulated, health, problem } = lab.view;
   const service = health && !lab.silent ? `version ${health.version}, up ${duration(health.uptime_s)}` : problem || lab.silent ? "no service" : "connecting";
   return html`<h1>Tactus <span id="rig">${rig}</span></h1>
     ${simulated && html`<p id="simulated">SIMULATED</p>`}
+    <nav><${Way} to="lab">Lab<//><${Way} to="runs">Runs<//></nav>
     <p id="service">${service}</p>`;
 }
 
@@ -26,7 +36,11 @@ function Page() {
   const problem = lab.silent ? "the dashboard does not answer; trying again" : lab.view.problem;
   return html`
     ${problem && html`<p id="problem" class="banner problem" role="alert">${problem}</p>`}
-    <div class="columns">
+    ${shown === "runs" ? html`<${Runs} draw=${draw}/>` : html`<${Lab}/>`}`;
+}
+
+function Lab() {
+  return html`<div class="columns">
       <div class="column image">
         <${Panel} id="array" title="Pressure image"><${ArrayImage} draw=${draw}/><//>
         <${Panel} id="place" title="Tip"><${Place}/><//>

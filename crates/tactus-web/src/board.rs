@@ -137,7 +137,8 @@ impl Board {
         Ok(())
     }
 
-    fn is_running(&self) -> bool {
+    /// True if a run is in progress.
+    pub(crate) fn is_running(&self) -> bool {
         self.run.as_ref().is_some_and(|run| match run.phase() {
             pb::RunPhase::Preparing
             | pb::RunPhase::Running

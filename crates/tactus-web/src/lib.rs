@@ -1,16 +1,21 @@
 //! The dashboard: a page with the live image, the stage, the run, its log, and STOP.
 //!
-//! It is a separate process without devices or files, and an ordinary client of the bus. Input from browsers never reaches
-//! the process that acquires frames.
+//! It is a separate process without devices, and an ordinary client of the bus. Of files it reads recordings, and writes notes beside them.
+//! Input from browsers never reaches the process that acquires frames.
 //!
 //! | path | what |
 //! |---|---|
 //! | `GET /` | the page; its scripts and style have their own paths |
 //! | `GET /live` | server-sent events: `rig`, `view`, `log` and `frame`, first all of them, then each when it changes |
 //! | `GET /history` | the frames of the last minutes, as numbers |
+//! | `GET /metrics` | connections, frames, losses, run, safety and tip, as Prometheus reads them |
+//! | `GET /runs` | the recorded runs with their tags and notes |
+//! | `GET /runs/compare/ID,ID` | in which settings and results runs differ |
+//! | `GET /runs/ID/report`, `/runs/ID/parquet`, `/csv`, `/npz`, `/mcap` | the report of a run, its table, its recording |
 //! | `POST /stop` | stops the rig, whether the service is ready or not |
 //! | `POST /experiments` | the list of experiments with their parameters: needs the header `x-tactus-token`, as all that follow |
 //! | `POST /plan` | a dry run on the rig's twin, in the service |
+//! | `POST /runs/ID/notes`, `/runs/ID/again` | writes tags and note of a run; makes it again |
 //! | `POST /zero` | a new zero for all viewers, with the tip up and no run in progress |
 //! | `POST /run`, `/move`, `/pause`, `/resume`, `/reset` | sends a command to the service, with the lease; `x-take-over` has the reason to take over the lease |
 //!
@@ -24,8 +29,10 @@ mod guard;
 mod history;
 mod live;
 mod log;
+mod metrics;
 mod order;
 mod page;
+mod runs;
 mod server;
 mod site;
 mod token;
@@ -46,6 +53,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
 
 use live::Live;
+use runs::Runs;
 use token::Token;
 
 /// The dashboard of Tactus.
@@ -65,6 +73,9 @@ struct Options {
     /// Host name that browsers of other machines use for the page, for example behind a proxy; several with commas.
     #[arg(long, env = "TACTUS_WEB_HOST", value_name = "NAME", value_delimiter = ',')]
     host: Vec<String>,
+    /// Folder of the recordings. Default: that of the installed service if it is there, else `runs`.
+    #[arg(long, env = "TACTUS_WEB_RUNS", value_name = "DIR")]
+    runs: Option<PathBuf>,
     /// File for the token of commands, new at each start, which its group may read. Default: `token` in systemd's runtime
     /// directory; without one the token is printed as a part of the page's address.
     #[arg(long, env = "TACTUS_WEB_TOKEN_FILE", value_name = "FILE")]
@@ -104,8 +115,10 @@ fn run(options: Options) -> anyhow::Result<()> {
         } else {
             info!("http://{address}/{}", token.fragment());
         }
+        let installed = Some(PathBuf::from(tactus_runs::INSTALLED)).filter(|folder| folder.is_dir());
+        let runs = Runs::new(options.runs.or(installed).unwrap_or_else(|| "runs".into()));
         let live = Live::start(options.endpoint, options.rig);
-        let site = site::site(live, guard::Hosts::new(address, options.host), Arc::new(token));
+        let site = site::site(live, runs, guard::Hosts::new(address, options.host), Arc::new(token));
         let mut terminated = signal(SignalKind::terminate()).context("SIGTERM")?;
         // Without systemd this does nothing.
         let _told = sd_notify::notify(&[NotifyState::Ready]);

@@ -126,6 +126,11 @@ impl Live {
         self.feed().board.history.bytes()
     }
 
+    /// The present state, as [`crate::metrics`] has it.
+    pub(crate) fn metrics(&self) -> String {
+        crate::metrics::metrics(&self.feed().board)
+    }
+
     /// Takes a zero for all viewers.
     ///
     /// # Errors

@@ -96,7 +96,7 @@ impl Question {
     }
 }
 
-fn parse<'a, T: Deserialize<'a>>(body: &'a [u8]) -> Result<T, String> {
+pub(crate) fn parse<'a, T: Deserialize<'a>>(body: &'a [u8]) -> Result<T, String> {
     serde_json::from_slice(body).map_err(|error| format!("the request's body is not understood: {error}"))
 }
 
@@ -112,9 +112,14 @@ fn run_request(body: &[u8]) -> Result<pb::RunRequest, String> {
         experiment,
         parameters_json: Value::Object(parameters).to_string(),
         seed: seed.map_err(|_| "the seed is a whole number from 0 to 2^64 - 1".to_owned())?,
-        who: who.trim().chars().filter(|c| !c.is_control()).take(WHO_CHARS_MAX).collect(),
+        who: name(&who),
         ..Default::default()
     })
+}
+
+/// A person's name, for the record of a run.
+pub(crate) fn name(who: &str) -> String {
+    who.trim().chars().filter(|c| !c.is_control()).take(WHO_CHARS_MAX).collect()
 }
 
 fn move_to(MoveForm { x_mm, y_mm }: MoveForm) -> pb::RunRequest {

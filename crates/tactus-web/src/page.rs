@@ -35,6 +35,7 @@ pub(crate) const FILES: &[File] = files![
     SCRIPT "place.js",
     SCRIPT "traces.js",
     SCRIPT "run.js",
+    SCRIPT "runs.js",
     SCRIPT "start.js",
     SCRIPT "log.js",
     STYLE "vendor/uPlot.min.css",

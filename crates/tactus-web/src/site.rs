@@ -17,8 +17,10 @@ use tokio::sync::broadcast::{self, error::RecvError};
 
 use crate::guard::{Hosts, guard};
 use crate::live::{Live, NotDone};
+use crate::metrics;
 use crate::order::{Order, Question};
 use crate::page;
+use crate::runs::{Download, NotRead, Runs};
 use crate::token::Token;
 
 /// Open pages at most.
@@ -33,30 +35,41 @@ const TAKE_OVER: HeaderName = HeaderName::from_static("x-take-over");
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+/// A report has its style inline. It has no scripts, and may not have any.
+const REPORT_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; \
+                             frame-ancestors 'none'; sandbox";
+
 /// Carries the token of commands.
 const TOKEN: HeaderName = HeaderName::from_static("x-tactus-token");
 
 #[derive(Clone)]
 struct Shared {
     live: Live,
+    runs: Runs,
     token: Arc<Token>,
     pages: Arc<Semaphore>,
 }
 
 /// The whole site.
-pub(crate) fn site(live: Live, hosts: Arc<Hosts>, token: Arc<Token>) -> Router {
+pub(crate) fn site(live: Live, runs: Runs, hosts: Arc<Hosts>, token: Arc<Token>) -> Router {
     let mut site = Router::new();
     for file in page::FILES {
         site = site.route(file.path, get(async move || ([(header::CONTENT_TYPE, file.kind)], file.text)));
     }
     site.route("/live", get(live_views))
         .route("/history", get(history))
+        .route("/metrics", get(metrics_text))
+        .route("/runs", get(run_list))
+        .route("/runs/compare/{ids}", get(compare))
+        .route("/runs/{id}/notes", post(notes))
+        .route("/runs/{id}/again", post(again))
+        .route("/runs/{id}/{what}", get(of_run))
         .route("/stop", post(stop))
         .route("/zero", post(zero))
         .route("/experiments", post(experiments))
         .route("/plan", post(plan))
         .route("/{command}", post(command))
-        .with_state(Shared { live, token, pages: Arc::new(Semaphore::new(PAGES_MAX)) })
+        .with_state(Shared { live, runs, token, pages: Arc::new(Semaphore::new(PAGES_MAX)) })
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
         .layer(from_fn_with_state(hosts, guard))
         .layer(map_response(with_policy))
@@ -64,7 +77,8 @@ pub(crate) fn site(live: Live, hosts: Arc<Hosts>, token: Arc<Token>) -> Router {
 
 async fn with_policy(mut response: Response) -> Response {
     let headers = response.headers_mut();
-    headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY));
+    // A report has a policy of its own.
+    headers.entry(header::CONTENT_SECURITY_POLICY).or_insert(HeaderValue::from_static(POLICY));
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
@@ -102,6 +116,92 @@ async fn next(rest: &mut broadcast::Receiver<Bytes>, live: &Live) -> Option<Byte
 
 async fn history(State(Shared { live, .. }): State<Shared>) -> Response {
     ([(header::CONTENT_TYPE, "application/octet-stream")], live.history()).into_response()
+}
+
+async fn metrics_text(State(Shared { live, .. }): State<Shared>) -> Response {
+    ([(header::CONTENT_TYPE, metrics::KIND)], live.metrics()).into_response()
+}
+
+async fn run_list(State(Shared { runs, .. }): State<Shared>) -> Response {
+    of_files(runs.list().await)
+}
+
+async fn compare(State(Shared { runs, .. }): State<Shared>, Path(ids): Path<String>) -> Response {
+    of_files(runs.compare(ids.split(',').map(str::to_owned).collect()).await)
+}
+
+/// The report of a run, or its data as a file.
+async fn of_run(
+    State(Shared { runs, .. }): State<Shared>,
+    Path((id, what)): Path<(String, String)>,
+) -> Response {
+    match what.as_str() {
+        "report" => match runs.report(id).await {
+            Ok(html) => {
+                let head = [
+                    (header::CONTENT_TYPE, "text/html; charset=utf-8"),
+                    (header::CONTENT_SECURITY_POLICY, REPORT_POLICY),
+                ];
+                (head, html).into_response()
+            }
+            Err(failure) => not_read(failure),
+        },
+        format => match runs.download(id, format).await {
+            Ok(Download { name, bytes }) => {
+                let head = [
+                    (header::CONTENT_TYPE, "application/octet-stream".to_owned()),
+                    (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
+                ];
+                (head, Body::from_stream(bytes)).into_response()
+            }
+            Err(failure) => not_read(failure),
+        },
+    }
+}
+
+/// Tags and note of a run.
+async fn notes(
+    State(Shared { runs, token, .. }): State<Shared>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+    body: Bytes,
+) -> Response {
+    if let Some(refusal) = without_token(&token, &headers) {
+        return refusal;
+    }
+    of_files(runs.mark(id, &body).await)
+}
+
+/// An earlier run again, with its script, parameters and seed; as [`command`].
+async fn again(
+    State(Shared { live, runs, token, .. }): State<Shared>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+    body: Bytes,
+) -> Response {
+    if let Some(refusal) = without_token(&token, &headers) {
+        return refusal;
+    }
+    match runs.again(id, &body).await {
+        Ok(request) => commanded(&live, Order::Run(request), &headers).await,
+        Err(failure) => not_read(failure),
+    }
+}
+
+fn of_files(answer: Result<Value, NotRead>) -> Response {
+    match answer {
+        Ok(value) => ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response(),
+        Err(failure) => not_read(failure),
+    }
+}
+
+fn not_read(failure: NotRead) -> Response {
+    match failure {
+        NotRead::Unknown(error) => (StatusCode::NOT_FOUND, error).into_response(),
+        NotRead::Wrong(error) => (StatusCode::BAD_REQUEST, error).into_response(),
+        NotRead::Busy(error) => (StatusCode::SERVICE_UNAVAILABLE, error).into_response(),
+        NotRead::Failed(error) => (StatusCode::CONFLICT, error).into_response(),
+    }
 }
 
 /// A stop, which needs neither the token nor the lease.
@@ -157,6 +257,10 @@ async fn command(
         Ok(order) => order,
         Err(error) => return (StatusCode::BAD_REQUEST, error).into_response(),
     };
+    commanded(&live, order, &headers).await
+}
+
+async fn commanded(live: &Live, order: Order, headers: &HeaderMap) -> Response {
     let take_over = headers.get(TAKE_OVER).and_then(|reason| reason.to_str().ok());
     match live.command(order, take_over).await {
         Ok(note) if note.is_empty() => StatusCode::NO_CONTENT.into_response(),

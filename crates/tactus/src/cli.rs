@@ -90,7 +90,7 @@ enum CliCommand {
     /// Inspect recordings.
     #[command(subcommand)]
     Record(RecordCommand),
-    /// Write the measurement table of recordings as .parquet, .csv or .npz.
+    /// Write the measurement table of recordings as .parquet, .csv or .npz, or a recording for stock MCAP viewers.
     Export(ExportArgs),
     /// Make a measurement table of a lab's own .csv, .npz or .mcap files, by a mapping of their columns.
     Import(ImportArgs),
@@ -346,7 +346,7 @@ pub(crate) enum RunsCommand {
         /// Id of the run.
         run: String,
         /// Single words.
-        #[arg(required = true, value_parser = commands::runs::tag)]
+        #[arg(required = true, value_parser = tactus_runs::tag)]
         tags: Vec<String>,
         /// Remove them instead.
         #[arg(long)]
@@ -419,8 +419,9 @@ pub(crate) struct ExportArgs {
     /// The table to write: .parquet, .csv or .npz; default: `table.parquet` beside the first recording.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
-    /// Format of the table; default: as the name of the file ends. Tactus itself reads Parquet only.
-    #[arg(long, value_name = "FORMAT", value_parser = ["parquet", "csv", "npz"])]
+    /// Format of the table; default: as the name of the file ends. Tactus itself reads Parquet only. `foxglove` writes one recording for
+    /// Foxglove and other MCAP viewers: the array as grid and image, the tip as a transform, the events as a log.
+    #[arg(long, value_name = "FORMAT", value_parser = ["parquet", "csv", "npz", "foxglove"])]
     pub(crate) format: Option<String>,
 }
 

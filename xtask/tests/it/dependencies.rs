@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 29] = [
+const ROWS: [&str; 30] = [
     "tactus-model",
     "tactus-solid",
     "tactus-scene",
@@ -21,6 +21,7 @@ const ROWS: [&str; 29] = [
     "tactus-record",
     "tactus-import",
     "tactus-report",
+    "tactus-runs",
     "tactus-bus",
     "tactus-log",
     "tactus-hidden",

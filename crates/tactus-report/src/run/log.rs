@@ -26,7 +26,7 @@ pub struct LoggedEvent {
 pub(super) fn events(timeline: &Timeline, frames: &FrameStatistics) -> Vec<LoggedEvent> {
     let logged = |event: &pb::RunEvent| {
         let at_s = seconds(timeline, MonoTime::from_ns(event.t_mono_ns));
-        let (kind, detail) = event.event.as_ref().map_or(("unknown", String::new()), describe);
+        let (kind, detail) = in_words(event);
         let routine = matches!(kind, "step" | "step done" | "phase" | "dwell" | "read");
         LoggedEvent { at_s, kind, detail, routine }
     };
@@ -39,6 +39,11 @@ pub(super) fn events(timeline: &Timeline, frames: &FrameStatistics) -> Vec<Logge
     let mut events: Vec<LoggedEvent> = timeline.events().iter().map(logged).chain(supervised).collect();
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     events
+}
+
+/// Name of the kind of an event, and its fields as text.
+pub(crate) fn in_words(event: &pb::RunEvent) -> (&'static str, String) {
+    event.event.as_ref().map_or(("unknown", String::new()), describe)
 }
 
 fn describe(event: &Event) -> (&'static str, String) {

@@ -87,6 +87,9 @@ fn tell_lacks(file: &Path, info: &Info) -> Exit {
 }
 
 pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit> {
+    if args.format.as_deref() == Some("foxglove") {
+        return export_for_viewers(common, args);
+    }
     let (out, format) = table_of(args)?;
     let summary = tactus_record::export_as(&args.recordings, &out, format)?;
     if common.json {
@@ -107,6 +110,30 @@ pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit>
     Ok(if summary.warnings.is_empty() { Exit::Done } else { Exit::Degraded })
 }
 
+fn export_for_viewers(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit> {
+    let [recording] = args.recordings.as_slice() else {
+        let what = "--format foxglove takes one recording: a viewer opens several files at once";
+        return Err(Failure::new(Exit::Usage, what).into());
+    };
+    let out = args.out.clone().unwrap_or_else(|| beside(Some(recording), "foxglove.mcap"));
+    if out == *recording {
+        let what = format!("--out {} is the recording itself: name another file", out.display());
+        return Err(Failure::new(Exit::Usage, what).into());
+    }
+    let written = tactus_report::viewer_file(recording, out)?;
+    if common.json {
+        println!("{}", serde_json::to_string(&written)?);
+    } else {
+        print_fields(&[
+            ("file", written.path.display().to_string()),
+            ("frames", written.frames.to_string()),
+            ("positions", written.positions.to_string()),
+            ("lines of the log", written.lines.to_string()),
+        ]);
+    }
+    Ok(Exit::Done)
+}
+
 /// The table to write, and its format: as asked, else as its name ends.
 fn table_of(args: &ExportArgs) -> anyhow::Result<(PathBuf, TableFormat)> {
     let asked =
@@ -118,7 +145,7 @@ fn table_of(args: &ExportArgs) -> anyhow::Result<(PathBuf, TableFormat)> {
     let format = asked.or_else(|| TableFormat::of_path(out)).ok_or_else(|| {
         let is_mcap = out.extension().is_some_and(|extension| extension == "mcap");
         let why = if is_mcap {
-            "a recording is MCAP already, and a table is not"
+            "a recording is MCAP already, and a table is not; --format foxglove writes MCAP for viewers"
         } else {
             "the name does not say the format"
         };

@@ -1,39 +1,22 @@
 //! `runs`, `rerun`: finds, marks, compares and repeats recorded runs.
 
-mod compare;
-mod index;
-mod notes;
+use std::path::Path;
 
-use std::path::{Path, PathBuf};
-
-use anyhow::{Context, bail};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use tactus_plan::{Arguments, Script};
-use tactus_record::Timeline;
+use tactus_runs::{Comparison, ListedRun, RunEntry, Runs, RunsError, RunsFolder, again, beside, mark};
 
 use super::run::{self, Subject};
 use crate::cli::{Common, LeaseArgs, RerunArgs, RunArgs, RunSubject, RunsArgs, RunsCommand};
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, print_fields, print_table, say};
-use index::RunEntry;
-use notes::Notes;
-
-/// Where the installed service records.
-const INSTALLED: &str = "/var/lib/tactus/runs";
-
-/// A run and what people wrote about it.
-struct ListedRun {
-    entry: RunEntry,
-    notes: Notes,
-}
 
 pub(crate) fn runs(common: &Common, args: &RunsArgs) -> anyhow::Result<Exit> {
     let folder = &args.runs;
     match &args.command {
         None => list(common, args),
         Some(RunsCommand::Tag { run, tags, remove }) => {
-            let found = find(folder, run)?;
-            let notes = notes::change(&found.entry.path, |notes| {
+            let marked = mark(found(folder, run)?, |notes| {
                 notes.tags.retain(|tag| !tags.contains(tag));
                 if !remove {
                     notes.tags.extend(tags.iter().cloned());
@@ -41,22 +24,35 @@ pub(crate) fn runs(common: &Common, args: &RunsArgs) -> anyhow::Result<Exit> {
                     notes.tags.dedup();
                 }
             })?;
-            Ok(told(common, &ListedRun { notes, ..found }))
+            Ok(told(common, &marked))
         }
         Some(RunsCommand::Note { run, text }) => {
-            let found = find(folder, run)?;
-            let notes = notes::change(&found.entry.path, |notes| notes.note.clone_from(text))?;
-            Ok(told(common, &ListedRun { notes, ..found }))
+            let marked = mark(found(folder, run)?, |notes| notes.note.clone_from(text))?;
+            Ok(told(common, &marked))
         }
         Some(RunsCommand::Compare { ids }) => {
-            let found = ids.iter().map(|run| find(folder, run)).collect::<anyhow::Result<Vec<_>>>()?;
-            compare::compare(common, &found)
+            let found = ids.iter().map(|run| found(folder, run)).collect::<anyhow::Result<Vec<_>>>()?;
+            let recordings: Vec<_> = found.into_iter().map(|run| run.entry.path).collect();
+            Ok(compared(common, &tactus_runs::compare(&recordings)?))
         }
     }
 }
 
+/// The only run with this id.
+fn found(folder: &Path, id: &str) -> anyhow::Result<ListedRun> {
+    RunsFolder::new(folder).find(id).map_err(failure)
+}
+
+/// Runs that cannot be found are told as a wrong use.
+fn failure(error: RunsError) -> anyhow::Error {
+    if error.is_usage() { Failure::new(Exit::Usage, error).into() } else { error.into() }
+}
+
 fn list(common: &Common, args: &RunsArgs) -> anyhow::Result<Exit> {
-    let mut all = read(&args.runs)?;
+    let Runs { runs: mut all, unreadable } = RunsFolder::new(&args.runs).runs().map_err(failure)?;
+    for error in unreadable {
+        eprintln!("tactus: {error}");
+    }
     let total = all.len();
     all.retain(|run| args.words.iter().all(|word| run.contains(word)));
     all.retain(|run| args.tag.iter().all(|tag| run.notes.tags.contains(tag)));
@@ -99,80 +95,39 @@ fn told(common: &Common, run: &ListedRun) -> Exit {
             ("run", run.entry.run_id.clone()),
             ("tags", run.notes.tags.join(" ")),
             ("note", run.notes.note.clone()),
-            ("file", notes::beside(&run.entry.path).display().to_string()),
+            ("file", beside(&run.entry.path).display().to_string()),
         ]);
     }
     Exit::Done
 }
 
-impl ListedRun {
-    /// True if a word stands in anything that is known of the run, whatever its case.
-    fn contains(&self, word: &str) -> bool {
-        let word = word.to_lowercase();
-        let Self { entry, notes } = self;
-        let status = entry.exit_status.as_deref().unwrap_or("open");
-        let texts = [
-            &*entry.run_id,
-            &entry.experiment,
-            &entry.rig,
-            &entry.who,
-            &entry.started,
-            &entry.message,
-            status,
-            &notes.note,
-        ];
-        let tags = notes.tags.iter().map(String::as_str);
-        texts.into_iter().chain(tags).any(|text| text.to_lowercase().contains(&word))
+/// A row for each setting and result; the runs' values in their order.
+fn compared(common: &Common, comparison: &Comparison) -> Exit {
+    let Comparison { runs, facts } = comparison;
+    if common.json {
+        let values = |wanted: bool| {
+            let facts = facts.iter().filter(|fact| fact.differs == wanted);
+            facts.map(|fact| (fact.name.clone(), json!(fact.values))).collect::<Map<String, Value>>()
+        };
+        say(&json!({ "runs": runs, "differ": values(true), "same": values(false) }).to_string());
+        return Exit::Done;
     }
-
-    fn to_json(&self) -> Value {
-        let mut value = json!(self.entry);
-        value["tags"] = json!(self.notes.tags);
-        value["note"] = json!(self.notes.note);
-        value
-    }
-}
-
-/// All runs of a folder, in the order of their start.
-fn read(folder: &Path) -> anyhow::Result<Vec<ListedRun>> {
-    if !folder.is_dir() {
-        let what = format!(
-            "no folder {}: name the folder of the recordings with --runs DIR; the installed service records in {INSTALLED}",
-            folder.display()
-        );
-        return Err(Failure::new(Exit::Usage, what).into());
-    }
-    let mut runs = Vec::new();
-    for entry in index::entries(folder)? {
-        let notes = notes::read(&entry.path)?;
-        runs.push(ListedRun { entry, notes });
-    }
-    Ok(runs)
-}
-
-/// The run with this id, or the only one whose id contains it.
-fn find(folder: &Path, id: &str) -> anyhow::Result<ListedRun> {
-    let mut found = read(folder)?;
-    if let Some(exact) = found.iter().position(|run| run.entry.run_id == id) {
-        return Ok(found.swap_remove(exact));
-    }
-    found.retain(|run| !id.is_empty() && run.entry.run_id.contains(id));
-    let ids: Vec<_> = found.iter().map(|run| run.entry.run_id.clone()).collect();
-    match (found.pop(), found.is_empty()) {
-        (Some(run), true) => Ok(run),
-        (None, _) => {
-            let what = format!("no run {id:?} in {}: `tactus runs` lists them", folder.display());
-            Err(Failure::new(Exit::Usage, what).into())
-        }
-        (Some(_), false) => {
-            Err(Failure::new(Exit::Usage, format!("{id:?} is one of {}: which?", ids.join(", "))).into())
-        }
-    }
+    let different = facts.iter().filter(|fact| fact.differs);
+    let different: Vec<Vec<String>> =
+        different.map(|fact| [vec![fact.name.clone()], fact.values.clone()].concat()).collect();
+    let header: Vec<&str> = std::iter::once("DIFFERENT").chain(runs.iter().map(String::as_str)).collect();
+    print_table(&header, &different);
+    let same = facts.iter().filter(|fact| !fact.differs);
+    let same: Vec<String> = same
+        .map(|fact| format!("{} {}", fact.name, fact.values.first().map_or("-", String::as_str)))
+        .collect();
+    say(&format!("the same: {}", same.join(", ")));
+    Exit::Done
 }
 
 /// Makes the experiment of an earlier run again: all of it, with its script, parameters and seed.
 pub(crate) fn rerun(common: &Common, args: &RerunArgs) -> anyhow::Result<Exit> {
-    let found = find(&args.runs, &args.run)?;
+    let found = found(&args.runs, &args.run)?;
     let subject = subject(&found.entry.path)?;
     if !common.json {
         let RunEntry { run_id, rig, .. } = &found.entry;
@@ -188,37 +143,15 @@ pub(crate) fn rerun(common: &Common, args: &RerunArgs) -> anyhow::Result<Exit> {
 }
 
 fn subject(recording: &Path) -> anyhow::Result<Subject> {
-    let timeline = Timeline::read(recording)?;
-    let file = &timeline.run().script;
-    let lacks = |what: &str| format!("{}: the recording lacks its {what}", recording.display());
-    let source = timeline.attachment(file).with_context(|| lacks("script"))?;
-    let source = std::str::from_utf8(source).with_context(|| lacks("script as text"))?;
-    let started = timeline.started().with_context(|| lacks("start, with parameters and seed"))?;
-    if timeline.run().simulated && timeline.attachment("rig.toml").is_none() {
+    let again = again(recording)?;
+    if again.had_truth {
         eprintln!(
             "tactus: the run was simulated with a --truth: give the same file again, or its readings will differ"
         );
     }
-    let script = Script::parse(file, source).map_err(|error| Failure::new(Exit::Failed, error))?;
-    let arguments = Arguments::from_json(&started.parameters_json);
+    let script = Script::parse(&again.script, &again.source);
+    let script = script.map_err(|error| Failure::new(Exit::Failed, error))?;
+    let arguments = Arguments::from_json(&again.parameters_json);
     let arguments = arguments.map_err(|error| Failure::new(Exit::Failed, error))?;
-    Ok(Subject::Experiment { script, arguments, seed: Some(started.seed) })
+    Ok(Subject::Experiment { script, arguments, seed: Some(again.seed) })
 }
-
-/// Refuses what is no tag: it must be found again by `--tag`.
-pub(crate) fn tag(text: &str) -> Result<String, String> {
-    let is_plain = !text.is_empty() && !text.chars().any(|c| c.is_whitespace() || c.is_control());
-    if is_plain { Ok(text.to_owned()) } else { Err("a tag is one word".to_owned()) }
-}
-
-/// At least two.
-fn several(runs: &[ListedRun]) -> anyhow::Result<Vec<PathBuf>> {
-    if runs.len() < 2 {
-        bail!("it takes two runs to compare");
-    }
-    Ok(runs.iter().map(|run| run.entry.path.clone()).collect())
-}
-
-#[cfg(test)]
-#[path = "runs_tests.rs"]
-mod tests;

@@ -13,7 +13,7 @@ fn notes_stand_beside_the_recording_and_a_wrong_file_is_named() {
     });
     assert_eq!(notes::read(&recording).unwrap(), written.unwrap());
     fs::write(folder.path().join("notes.toml"), "tag = [\"x\"]\n").unwrap();
-    let error = format!("{:#}", notes::read(&recording).unwrap_err());
+    let error = notes::read(&recording).unwrap_err().to_string();
     assert!(error.contains("notes.toml") && error.contains("tag"), "{error}");
 }
 
@@ -22,8 +22,20 @@ fn an_index_that_cannot_be_read_is_made_anew() {
     let folder = tempfile::tempdir().unwrap();
     for text in ["", "{", "{\"schema\":\"tactus.runs/9\",\"recordings\":{}}"] {
         fs::write(folder.path().join(index::INDEX), text).unwrap();
-        assert_eq!(index::entries(folder.path()).unwrap(), []);
+        let (index, unreadable) = Index::kept(folder.path()).renewed(folder.path()).unwrap();
+        assert!(index.entries().is_empty() && unreadable.is_empty());
     }
+}
+
+#[test]
+fn a_recording_that_cannot_be_read_is_named_and_hides_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("broken.mcap"), "not MCAP").unwrap();
+    let here = RunsFolder::new(folder.path());
+    let Runs { runs, unreadable } = here.runs().unwrap();
+    assert!(runs.is_empty() && unreadable[0].contains("broken.mcap"), "{unreadable:?}");
+    assert!(here.find("x").unwrap_err().is_usage());
+    assert!(RunsFolder::new(folder.path().join("nowhere")).runs().unwrap_err().is_usage());
 }
 
 #[test]

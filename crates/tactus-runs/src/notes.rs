@@ -4,8 +4,9 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use serde::{Deserialize, Serialize};
+
+use crate::RunsError;
 
 /// Name of the file beside the recording.
 const NOTES: &str = "notes.toml";
@@ -13,36 +14,49 @@ const NOTES: &str = "notes.toml";
 /// Tags and note of a run.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Notes {
+pub struct Notes {
     /// Single words, sorted, each once.
-    pub(super) tags: Vec<String>,
-    pub(super) note: String,
+    pub tags: Vec<String>,
+    /// Any text.
+    pub note: String,
 }
 
 /// The file of a recording.
-pub(super) fn beside(recording: &Path) -> PathBuf {
+pub fn beside(recording: &Path) -> PathBuf {
     recording.with_file_name(NOTES)
 }
 
 /// The notes of a recording; none if nobody wrote any.
-pub(super) fn read(recording: &Path) -> anyhow::Result<Notes> {
+pub(crate) fn read(recording: &Path) -> Result<Notes, RunsError> {
     let path = beside(recording);
     let text = match fs::read_to_string(&path) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Notes::default()),
-        Err(error) => return Err(error).with_context(|| path.display().to_string()),
+        Err(source) => return Err(RunsError::Io { action: "read", path, source }),
     };
-    toml::from_str(&text).with_context(|| path.display().to_string())
+    toml::from_str(&text).map_err(|source| RunsError::Notes { path, source })
 }
 
 /// Changes the notes of a recording, and returns them.
-pub(super) fn change(recording: &Path, change: impl FnOnce(&mut Notes)) -> anyhow::Result<Notes> {
+pub(crate) fn change(recording: &Path, change: impl FnOnce(&mut Notes)) -> Result<Notes, RunsError> {
     let mut notes = read(recording)?;
     change(&mut notes);
     let path = beside(recording);
     let part = path.with_extension(format!("{}.part", std::process::id()));
-    let text = toml::to_string(&notes).context("the notes")?;
+    let text = match toml::to_string(&notes) {
+        Ok(text) => text,
+        Err(source) => return Err(RunsError::Unwritable { path, source }),
+    };
     let written = fs::write(&part, text).and_then(|()| fs::rename(&part, &path));
-    written.with_context(|| path.display().to_string())?;
+    written.map_err(|source| RunsError::Io { action: "write", path, source })?;
     Ok(notes)
+}
+
+/// Refuses what is no tag: it must be found again.
+///
+/// # Errors
+/// What a tag is.
+pub fn tag(text: &str) -> Result<String, String> {
+    let is_plain = !text.is_empty() && !text.chars().any(|c| c.is_whitespace() || c.is_control());
+    if is_plain { Ok(text.to_owned()) } else { Err("a tag is one word".to_owned()) }
 }

@@ -1,18 +1,41 @@
 //! In what runs differ: settings and outcome, side by side.
 
-use serde_json::{Map, Value, json};
+use std::path::Path;
+
+use serde::Serialize;
 use tactus_report::{ResponseCurves, RunReport, run_report};
 
-use super::{ListedRun, several};
-use crate::cli::Common;
-use crate::exit::{Exit, in_words};
-use crate::output::{print_table, say};
+use crate::RunsError;
 
-/// A row for each setting and result; the runs' values in their order.
-pub(super) fn compare(common: &Common, runs: &[ListedRun]) -> anyhow::Result<Exit> {
-    let paths = several(runs)?;
-    let reports = paths.iter().map(|path| run_report(path)).collect::<Result<Vec<_>, _>>();
-    let reports = reports.map_err(|error| anyhow::anyhow!(in_words(&error.into())))?;
+/// Settings and results of several runs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Comparison {
+    /// Ids of the runs, as they were given.
+    pub runs: Vec<String>,
+    /// In the order of a report.
+    pub facts: Vec<Fact>,
+}
+
+/// A setting or result, with its value in each run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Fact {
+    /// What it is.
+    pub name: String,
+    /// The runs' values in their order; `-` where there is none.
+    pub values: Vec<String>,
+    /// True if they are not all the same.
+    pub differs: bool,
+}
+
+/// Compares the settings and results of recorded runs.
+///
+/// # Errors
+/// If there are fewer than two, or one cannot be read.
+pub fn compare<P: AsRef<Path>>(recordings: &[P]) -> Result<Comparison, RunsError> {
+    if recordings.len() < 2 {
+        return Err(RunsError::TooFew);
+    }
+    let reports = recordings.iter().map(|path| run_report(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
     let columns: Vec<Vec<(String, String)>> = reports.iter().map(facts).collect();
     let mut names: Vec<&String> = Vec::new();
     for (name, _) in columns.iter().flatten() {
@@ -23,34 +46,13 @@ pub(super) fn compare(common: &Common, runs: &[ListedRun]) -> anyhow::Result<Exi
     let value = |column: &Vec<(String, String)>, name: &String| {
         column.iter().find(|(one, _)| one == name).map_or_else(|| "-".to_owned(), |(_, value)| value.clone())
     };
-    let rows: Vec<(&String, Vec<String>)> = names
-        .iter()
-        .map(|name| (*name, columns.iter().map(|column| value(column, name)).collect()))
-        .collect();
-    let differs = |values: &[String]| values.windows(2).any(|pair| pair[0] != pair[1]);
-    let ids: Vec<&str> = runs.iter().map(|run| run.entry.run_id.as_str()).collect();
-    if common.json {
-        let values = |wanted: bool| {
-            let rows = rows.iter().filter(|(_, values)| differs(values) == wanted);
-            rows.map(|(name, values)| ((*name).clone(), json!(values))).collect::<Map<String, Value>>()
-        };
-        say(&json!({ "runs": ids, "differ": values(true), "same": values(false) }).to_string());
-        return Ok(Exit::Done);
-    }
-    let different: Vec<Vec<String>> = rows
-        .iter()
-        .filter(|(_, values)| differs(values))
-        .map(|(name, values)| [vec![(*name).clone()], values.clone()].concat())
-        .collect();
-    let header: Vec<&str> = std::iter::once("DIFFERENT").chain(ids).collect();
-    print_table(&header, &different);
-    let same: Vec<String> = rows
-        .iter()
-        .filter(|(_, values)| !differs(values))
-        .map(|(name, values)| format!("{name} {}", values.first().map_or("-", String::as_str)))
-        .collect();
-    say(&format!("the same: {}", same.join(", ")));
-    Ok(Exit::Done)
+    let fact = |name: &String| {
+        let values: Vec<String> = columns.iter().map(|column| value(column, name)).collect();
+        let differs = values.windows(2).any(|pair| pair[0] != pair[1]);
+        Fact { name: name.clone(), values, differs }
+    };
+    let runs = reports.iter().map(|report| report.summary.run_id.clone()).collect();
+    Ok(Comparison { runs, facts: names.into_iter().map(fact).collect() })
 }
 
 /// Names and values of what a run was and gave.
