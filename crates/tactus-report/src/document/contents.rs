@@ -19,10 +19,11 @@ pub(super) fn listed(body: String) -> String {
         Some(heading.to_owned())
     };
     let numbered = || sections.iter().enumerate();
-    let links: String = numbered()
+    let links: Vec<String> = numbered()
         .filter_map(|(nth, section)| Some(format!("<a href=\"#section-{nth}\">{}</a>\n", heading(section)?)))
         .collect();
-    let rest: String =
+    let rest: Vec<String> =
         numbered().map(|(nth, section)| format!("<section id=\"section-{nth}\">\n{section}")).collect();
+    let (links, rest) = (links.concat(), rest.concat());
     format!("{header}{HEADER_END}<nav class=\"contents\">\n{links}</nav>\n{lead}{rest}")
 }
