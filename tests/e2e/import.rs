@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 use tactus_e2e::{CommandOutput, repository, tactus};
@@ -75,7 +75,7 @@ fn done(said: CommandOutput) -> CommandOutput {
 }
 
 /// The table of a run on the embedded rig, as Parquet and as the lab would have written it.
-fn measured(folder: &Path) -> PathBuf {
+fn measured(folder: &Path) {
     let said = done(tactus(
         folder,
         &["--json", "run", "element-centres", "--embedded", "--no-report", "--seed", "7"],
@@ -97,7 +97,6 @@ fn measured(folder: &Path) -> PathBuf {
     }
     fs::write(folder.join("bench.csv"), text.replace('.', ",")).unwrap();
     fs::write(folder.join("lab.toml"), MAPPING).unwrap();
-    folder.join("bench.csv")
 }
 
 fn calibrated(folder: &Path, table: &str) -> Value {
@@ -149,7 +148,7 @@ fn a_foreign_file_gives_the_model_of_the_original() {
 
     // Phases from the path give each dwell some frames more; the same phases give the same model.
     let ours = calibrated(folder.path(), "ours.parquet");
-    for (table, share) in [("bench.parquet", 0.5), ("phases.parquet", 1e-4)] {
+    for (table, share) in [("bench.parquet", 0.5), ("phases.parquet", 1e-3)] {
         let theirs = calibrated(folder.path(), table);
         let faulty = |found: &Value| {
             let faults = found["health"]["faults"].as_array().unwrap().iter();
