@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use tactus_device::StageError;
 use tactus_plan::{Arguments, Evaluate, RigView, Script, ScriptLimits};
 use tactus_safety::Fault;
 use tactus_schema::table::Phase;
@@ -128,7 +129,7 @@ impl Run {
         let run_id = run.order.run_id.clone();
         let opened = run.shared.acquisition.tell(move |live| live.open_recording(record, run_id)).await;
         let result = match opened {
-            Ok(()) => run.run_to_end().await,
+            Ok(()) => run.run_to_end().await.map_err(|broken| run.reason_of(broken)),
             Err(gone) => Err(gone.into()),
         };
         if !run.is_prepared {
@@ -169,6 +170,14 @@ impl Run {
         self.prepare().await?;
         self.set_state(pb::RunPhase::Running, "").await;
         self.run_script().await
+    }
+
+    /// The order to end, if what broke the run is only that the stage was stopped by it.
+    fn reason_of(&self, broken: Broken) -> Broken {
+        match (&broken, self.shared.check_ended()) {
+            (Broken::Stage(StageError::Stopped { .. }) | Broken::Disturbed, Err(ended)) => ended,
+            _ => broken,
+        }
     }
 
     /// Retracts the tip after the script, or after what broke it.

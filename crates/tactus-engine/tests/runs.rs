@@ -207,6 +207,22 @@ async fn stop_works_while_preparing_moving_paused_and_retracting() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_stop_that_meets_a_question_to_the_stage_is_the_reason() {
+    for looks in 0..6 {
+        let bench = Bench::start(|rig| rig);
+        bench.trouble.lock().unwrap().looks_before_stop = Some(looks);
+        let run = start(&bench, PRESS, &Memory::default());
+        while bench.trouble.lock().unwrap().looks_before_stop.is_some() {
+            sleep(Duration::from_millis(1)).await;
+        }
+        assert!(bench.engine.stop(order(false)));
+        let outcome = run.await.unwrap();
+        assert_eq!(outcome.exit_status, ExitStatus::Stopped, "question {looks}: {}", outcome.message);
+        assert!(outcome.message.contains("stopped by test: enough"), "{}", outcome.message);
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_pause_comes_between_steps_with_the_tip_up_and_resuming_does_every_press_once() {
     let mut bench = Bench::start(|rig| rig);
     let memory = Memory::default();

@@ -26,6 +26,8 @@ pub(crate) struct Trouble {
     pub(crate) absent: Option<&'static str>,
     /// The next question to the stage below the surface panics.
     pub(crate) look_panics: bool,
+    /// Questions to the stage before one that is answered only by the next stop.
+    pub(crate) looks_before_stop: Option<u32>,
     /// Moves down that the stage will break off half-way, because no report came, before the next one.
     pub(crate) unanswered: u32,
     /// Moves up that the stage will refuse.
@@ -229,7 +231,13 @@ impl Stage for FakeStage {
             if let Some(code) = self.trouble.lock().unwrap().alarm {
                 return Err(StageError::Alarm { code, name: code.to_string(), meaning: "hard limit".into() });
             }
+            let left = self.trouble.lock().unwrap().looks_before_stop;
+            self.trouble.lock().unwrap().looks_before_stop = left.and_then(|left| left.checked_sub(1));
             let at_mm = self.position_mm();
+            if left == Some(0) {
+                self.stops.subscribe().changed().await.unwrap();
+                return Err(StageError::Stopped { position_mm: at_mm });
+            }
             let panics = at_mm[2] < 0.0 && std::mem::take(&mut self.trouble.lock().unwrap().look_panics);
             assert!(!panics, "a stage that panics, for a test");
             self.report(at_mm, pb::StageStatus::Idle).await;
