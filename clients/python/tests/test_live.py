@@ -109,7 +109,7 @@ def test_the_example_counts(pulse):
     assert tally["device_lost"] == span - 200 > 0
 
 
-def test_a_read_commands_nothing_and_a_stop_needs_no_name(pulse):
+def test_a_read_commands_nothing_and_a_stop_needs_no_name(pulse, monkeypatch):
     with tactus_client.connect(pulse) as client:
         client.run("corners")
         request = messages.CommandRequest(who="reader").SerializeToString()
@@ -119,6 +119,7 @@ def test_a_read_commands_nothing_and_a_stop_needs_no_name(pulse):
                 replies = client._session.get(selector, payload=payload, target=zenoh.QueryTarget.ALL, timeout=0.05)
                 assert [reply for reply in replies if reply.ok is not None] == []
         assert messages.name_of(client.status().state, "phase") == "RUN_PHASE_RUNNING"
+        monkeypatch.setenv("TACTUS_RIG", "elsewhere")
         assert tactus_client.stop(pulse).rig == "pulse"
         assert messages.name_of(client.status().state, "phase") == "RUN_PHASE_FINISHED"
 

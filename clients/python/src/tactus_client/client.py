@@ -71,10 +71,9 @@ def stop(
 ) -> messages.CommandReply:
     """Stops every rig that the service at ``endpoint`` reaches, or the one of that name; the fastest way to stop.
 
-    It needs no connection where the service is on this machine. Returns the ``CommandReply`` of a service. Raises
-    ``NoAnswer`` if none answered: then nothing is known.
+    ``TACTUS_RIG`` does not narrow it. It needs no connection where the service is on this machine. Returns the ``CommandReply`` of a
+    service. Raises ``NoAnswer`` if none answered: then nothing is known.
     """
-    rig = os.environ.get("TACTUS_RIG") or None if rig is None else rig
     _check_rig_name(rig)
     endpoint = _of_this_machine() if endpoint is None else endpoint
     request = messages.CommandRequest(who=_who(), reason=reason, abort=abort)
