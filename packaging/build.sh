@@ -12,6 +12,8 @@ done
 mkdir -p $made
 "$programs/tactus" completions bash > $made/tactus.bash
 "$programs/tactus" completions zsh > $made/_tactus
+# zsh reads the file at the first Tab, and has to complete that one, too.
+echo '[ "$funcstack[1]" = "_tactus" ] && _clap_dynamic_completer_tactus "$@"' >> $made/_tactus
 "$programs/tactus" completions fish > $made/tactus.fish
 packaging/licences.py tactus tactus-daemon tactus-web tactus-mock > $made/third-party-licences.txt
 
@@ -30,6 +32,7 @@ while read -r source destination mode; do
     done
 done < <(grep -v '^#' packaging/files)
 strip --strip-unneeded "$root"/usr/bin/*
+gzip --best --no-name "$root"/usr/share/man/man1/*
 
 # The packages of the shared libraries that the programs load. dpkg-shlibdeps wants to stand beside a debian/control.
 scratch=$(mktemp -d)
@@ -60,6 +63,7 @@ for program in tactus tactusd tactus-web tactus-mock; do
     [ "$("$root/usr/bin/$program" --version)" = "$program $(dpkg-deb --field $out/tactus.deb Version | sed 's/-[^-]*$//')" ] ||
         fail "$program has another version"
     ! readelf --sections "$root/usr/bin/$program" | grep -q '\.debug_info' || fail "$program is not stripped"
+    zgrep -q '^\.SH NAME' "$root/usr/share/man/man1/$program.1.gz" || fail "$program has no manual page"
 done
 notices=$root/usr/share/doc/tactus/third-party-licences.txt
 for crate in zenoh libusb1-sys zstd-sys tokio; do
@@ -69,6 +73,9 @@ for part in "relink the programs" "Copyright © 2001 Johannes Erdfelt" "GNU LESS
     awk '/^# / { is_libusb = /^# libusb1-sys / } is_libusb' "$notices" | grep "$part" > /dev/null || fail "libusb's licence lacks: $part"
 done
 for script in postinst prerm postrm; do sh -n "$root/DEBIAN/$script" || fail "$script does not parse"; done
+if command -v lexgrog > /dev/null; then
+    lexgrog "$root"/usr/share/man/man1/*.gz > /dev/null || fail "a manual page has no name that whatis could list"
+fi
 bash -n "$root/usr/share/bash-completion/completions/tactus" || fail "bash's completions do not parse"
 "$root/usr/bin/tactus" validate "$root"/etc/tactus/tactusd.toml "$root"/etc/tactus/rigs/*.toml "$root"/usr/share/tactus/*/*.toml \
     "$root"/usr/share/tactus/*/*.star > /dev/null

@@ -3,6 +3,7 @@
 mod awake;
 mod bad_input;
 mod bench;
+mod book;
 mod calibrate;
 mod continued;
 mod design;

@@ -129,7 +129,7 @@ fn experiments_are_listed_begun_and_their_errors_shown() {
     let begun = done(tactus(&["new", "touch"]));
     assert!(begun.out.contains("tactus plan ./touch.star"), "{begun:?}");
     let planned = done(tactus(&["plan", "touch.star", "--embedded"]));
-    assert!(planned.out.contains("`tactus run touch.star` does it"), "{planned:?}");
+    assert!(planned.out.contains("`tactus run touch.star --embedded` does it"), "{planned:?}");
     assert_eq!(tactus(&["new", "touch"]).code, Some(1), "a file is never replaced");
     assert_eq!(tactus(&["new", "../touch"]).code, Some(2), "a name is no path");
     let reference = done(tactus(&["script", "reference"]));

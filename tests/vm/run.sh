@@ -25,7 +25,9 @@ mkdir "$stage/bin"
 for program in tactus tactusd tactus-mock; do
     strip --strip-all -o "$stage/bin/$program" "$binaries/$program"
 done
-cp -r "$repository/README.md" "$repository/config" "$repository/experiments" "$here/guest" "$stage/"
+mkdir -p "$stage/docs/book"
+cp -r "$repository/docs/book/how-to" "$stage/docs/book/"
+cp -r "$repository/config" "$repository/experiments" "$here/guest" "$stage/"
 printf '%s\n' "$@" > "$stage/chosen"
 
 python3 "$here/machine.py" run "$work" "$stage"

@@ -2,10 +2,13 @@
 //!
 //! - `cargo xtask proto` compiles the messages.
 //! - `cargo xtask assets` writes the tools as STL.
+//! - `cargo xtask reference` writes the book's reference and the manual pages.
 
 mod assets;
 #[cfg(any(test, feature = "proto"))]
 mod messages;
+#[cfg(any(test, feature = "reference"))]
+mod reference;
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +20,9 @@ fn main() -> Result<()> {
         #[cfg(feature = "proto")]
         Some("proto") => messages::compile(&repository(), &repository()),
         Some("assets") => assets::write(&repository()),
-        other => bail!("unknown task {other:?}; known: proto, assets"),
+        #[cfg(feature = "reference")]
+        Some("reference") => reference::write(&repository(), &repository()),
+        other => bail!("unknown task {other:?}; known: proto, assets, reference"),
     }
 }
 

@@ -1,8 +1,4 @@
-//! `tactusd`: the lab service. [`service`] composes it of the bus, the engine and `tactus-runner`.
-
-mod inhibitor;
-mod notify;
-mod service;
+//! `tactusd`: the lab service.
 
 use std::process::ExitCode;
 
@@ -10,5 +6,5 @@ use tactus_runner::script_process;
 
 fn main() -> ExitCode {
     // A script is evaluated in a process of its own, which is this program again.
-    script_process::main_if_child().unwrap_or_else(service::main)
+    script_process::main_if_child().unwrap_or_else(tactus_daemon::main)
 }

@@ -25,7 +25,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use tactus_bus::{Bus, BusConfig, BusError, Calls, TlsConfig};
 use tactus_device::Clock;
 use tactus_engine::{Engine, EngineError, StopOrder};
@@ -80,8 +80,13 @@ enum ServiceError {
     Hung,
 }
 
+/// The options of `tactusd`.
+pub fn command() -> clap::Command {
+    Options::command()
+}
+
 /// Runs `tactusd` with the process's arguments.
-pub(crate) fn main() -> ExitCode {
+pub fn main() -> ExitCode {
     let options = Options::parse();
     let config = match ServiceConfig::load(&options.config) {
         Ok(config) => config,

@@ -126,13 +126,19 @@ pub enum ConfigError {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawConfig {
+    /// The rig file.
     rig: PathBuf,
+    /// Folder of experiment scripts, searched before the built-in ones.
     #[serde(default)]
     experiments: Option<PathBuf>,
+    /// Folder of recordings, `runs` without the key. Relative to systemd's state directory if there is one,
+    /// else to the working directory.
     #[serde(default = "runs")]
     recordings: PathBuf,
+    /// Where the service listens, and to whom it connects.
     #[serde(default)]
     bus: BusSection,
+    /// Format and filter of the log.
     #[serde(default)]
     log: LogSection,
 }

@@ -136,6 +136,16 @@ fn keep(path: &Path, index: &Index) {
     }
 }
 
+/// Ids of the runs of a folder, as their own folders are named; none if it cannot be read. No recording is opened.
+pub fn ids(folder: &Path) -> Vec<String> {
+    let mut files = Vec::new();
+    if search(folder, DEPTH_MAX, &mut files).is_err() {
+        return Vec::new();
+    }
+    let names = files.iter().filter_map(|file| file.parent()?.file_name());
+    names.map(|name| name.to_string_lossy().into_owned()).collect()
+}
+
 /// Recordings in a folder and those below it.
 fn search(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), RunsError> {
     let failed = |source| RunsError::Io { action: "read", path: folder.to_owned(), source };

@@ -21,7 +21,7 @@ use index::Index;
 pub use again::{Again, again};
 pub use compare::{Comparison, Fact, compare};
 pub use error::RunsError;
-pub use index::RunEntry;
+pub use index::{RunEntry, ids};
 pub use notes::{Notes, beside, tag};
 
 /// Where the installed service records.

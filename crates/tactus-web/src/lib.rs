@@ -44,7 +44,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use anyhow::Context;
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use sd_notify::NotifyState;
 use tactus_bus::Endpoint;
 use tactus_log::LogFormat;
@@ -80,6 +80,11 @@ struct Options {
     /// directory; without one the token is printed as a part of the page's address.
     #[arg(long, env = "TACTUS_WEB_TOKEN_FILE", value_name = "FILE")]
     token_file: Option<PathBuf>,
+}
+
+/// The options of `tactus-web`.
+pub fn command() -> clap::Command {
+    Options::command()
 }
 
 /// Runs `tactus-web` with the process's arguments.

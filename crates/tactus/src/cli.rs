@@ -7,11 +7,13 @@ use std::process::ExitCode;
 use clap::builder::NonEmptyStringValueParser;
 use clap::parser::ValueSource;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
-use clap_complete::Shell;
+use clap_complete::engine::ArgValueCompleter;
+use clap_complete::{CompleteEnv, Shell};
 use tactus_bus::{Credentials, Endpoint};
 use tactus_log::LogFormat;
 
 use crate::commands;
+use crate::completion;
 use crate::exit::{Exit, in_words};
 
 /// A lab service for tactile arrays: run experiments, watch, record, export.
@@ -44,7 +46,7 @@ pub(crate) struct Common {
     #[arg(long, global = true, value_name = "DIR", env = "TACTUS_CERTIFICATES")]
     pub(crate) certificates: Option<PathBuf>,
     /// Name of the rig, if several are served; for `stage check` and `devices`, its file.
-    #[arg(long, global = true, value_name = "NAME", env = "TACTUS_RIG")]
+    #[arg(long, global = true, value_name = "NAME", env = "TACTUS_RIG", add = ArgValueCompleter::new(completion::rigs))]
     pub(crate) rig: Option<String>,
     /// Print one JSON object to standard output.
     #[arg(long, global = true)]
@@ -124,7 +126,7 @@ enum CliCommand {
     Stage(StageCommand),
     /// Check files: configurations, rigs, models, links, scripts, tables, recordings.
     Validate(ValidateArgs),
-    /// Print the completions for a shell.
+    /// Print the completions for a shell; they know experiments, rigs and runs.
     Completions {
         /// Shell to complete for.
         shell: Shell,
@@ -184,6 +186,7 @@ pub(crate) enum EffectsCommand {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ExperimentArgs {
     /// Name of an experiment, or path of a .star file.
+    #[arg(add = ArgValueCompleter::new(completion::experiments))]
     pub(crate) experiment: String,
     /// A script parameter, such as `depths_mm=[0.2,0.4]`; may be repeated.
     #[arg(short = 'p', long = "param", value_name = "NAME=VALUE")]
@@ -197,7 +200,7 @@ pub(crate) struct ExperimentArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RunSubject {
     /// Name of an experiment, or path of a .star file.
-    #[arg(required_unless_present = "continue_run")]
+    #[arg(required_unless_present = "continue_run", add = ArgValueCompleter::new(completion::experiments))]
     pub(crate) experiment: Option<String>,
     /// A script parameter, such as `depths_mm=[0.2,0.4]`; may be repeated.
     #[arg(short = 'p', long = "param", value_name = "NAME=VALUE")]
@@ -210,6 +213,7 @@ pub(crate) struct RunSubject {
         long = "continue",
         id = "continue_run",
         value_name = "RUN_ID",
+        add = ArgValueCompleter::new(completion::run_ids),
         value_parser = NonEmptyStringValueParser::new(),
         conflicts_with_all = ["experiment", "parameters", "seed"]
     )]
@@ -231,7 +235,7 @@ pub(crate) struct RunArgs {
     #[arg(long)]
     pub(crate) embedded: bool,
     /// File of the embedded rig, instead of the shipped one.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = ArgValueCompleter::new(completion::rig_files))]
     pub(crate) rig_file: Option<PathBuf>,
     /// True physics of the embedded rig's sensor: a model file, which replaces the rig file's gains, noise and spread, or
     /// a file of hidden physics.
@@ -281,7 +285,7 @@ pub(crate) struct PlanArgs {
     #[arg(long)]
     pub(crate) embedded: bool,
     /// The rig's file, instead of the rig that would run it.
-    #[arg(long, value_name = "FILE", conflicts_with = "embedded")]
+    #[arg(long, value_name = "FILE", conflicts_with = "embedded", add = ArgValueCompleter::new(completion::rig_files))]
     pub(crate) rig_file: Option<PathBuf>,
 }
 
@@ -289,6 +293,7 @@ pub(crate) struct PlanArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ExperimentsArgs {
     /// Name of an experiment, or path of a .star file; without it all are listed.
+    #[arg(add = ArgValueCompleter::new(completion::experiments))]
     pub(crate) name: Option<String>,
     /// Folder of the lab's own experiments (.star), listed too.
     #[arg(long, value_name = "DIR")]
@@ -344,6 +349,7 @@ pub(crate) enum RunsCommand {
     /// Add tags to a run, in `notes.toml` beside its recording.
     Tag {
         /// Id of the run.
+        #[arg(add = ArgValueCompleter::new(completion::run_ids))]
         run: String,
         /// Single words.
         #[arg(required = true, value_parser = tactus_runs::tag)]
@@ -355,6 +361,7 @@ pub(crate) enum RunsCommand {
     /// Write a note about a run, in `notes.toml` beside its recording. It replaces the earlier one.
     Note {
         /// Id of the run.
+        #[arg(add = ArgValueCompleter::new(completion::run_ids))]
         run: String,
         /// The note; an empty one removes it.
         text: String,
@@ -362,7 +369,7 @@ pub(crate) enum RunsCommand {
     /// Show in which settings and results runs differ.
     Compare {
         /// Ids of the runs.
-        #[arg(required = true, num_args = 2.., value_name = "RUN")]
+        #[arg(required = true, num_args = 2.., value_name = "RUN", add = ArgValueCompleter::new(completion::run_ids))]
         ids: Vec<String>,
     },
 }
@@ -371,6 +378,7 @@ pub(crate) enum RunsCommand {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RerunArgs {
     /// Id of the run, or a part that only one has.
+    #[arg(add = ArgValueCompleter::new(completion::run_ids))]
     pub(crate) run: String,
     /// Folder of the recordings.
     #[arg(long, value_name = "DIR", default_value = "runs")]
@@ -379,7 +387,7 @@ pub(crate) struct RerunArgs {
     #[arg(long)]
     pub(crate) embedded: bool,
     /// File of the embedded rig, instead of the shipped one.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = ArgValueCompleter::new(completion::rig_files))]
     pub(crate) rig_file: Option<PathBuf>,
     /// True physics of the embedded rig's sensor, as for `run`.
     #[arg(long, value_name = "FILE")]
@@ -515,7 +523,7 @@ pub(crate) struct DiscoverArgs {
     #[arg(long, requires = "active")]
     pub(crate) embedded: bool,
     /// File of the embedded rig, instead of the shipped one.
-    #[arg(long, value_name = "FILE", requires = "active")]
+    #[arg(long, value_name = "FILE", requires = "active", add = ArgValueCompleter::new(completion::rig_files))]
     pub(crate) rig_file: Option<PathBuf>,
     /// True physics of the embedded rig's sensor, as for `run`.
     #[arg(long, value_name = "FILE", requires = "active")]
@@ -545,7 +553,7 @@ pub(crate) struct StudyArgs {
     #[arg(long)]
     pub(crate) embedded: bool,
     /// File of the embedded rig, instead of the shipped one.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = ArgValueCompleter::new(completion::rig_files))]
     pub(crate) rig_file: Option<PathBuf>,
     /// True physics of the embedded rig's sensor: a model file, which replaces the rig file's gains, noise and spread, or
     /// a file of hidden physics.
@@ -725,7 +733,7 @@ enum StageCommand {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct StageCheckArgs {
     /// The rig's file; the same as `--rig FILE.toml`.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", add = ArgValueCompleter::new(completion::rig_files))]
     pub(crate) rig_file: Option<PathBuf>,
     /// Home the stage first: it moves to its limit switches.
     #[arg(long)]
@@ -743,8 +751,15 @@ pub(crate) struct ValidateArgs {
     pub(crate) files: Vec<PathBuf>,
 }
 
+/// The commands and their options.
+pub fn command() -> clap::Command {
+    Cli::command()
+}
+
 /// Runs `tactus` with the process's arguments.
 pub fn main() -> ExitCode {
+    // A shell that completes asks for it in a variable, and this call then ends the process.
+    CompleteEnv::with_factory(Cli::command).complete();
     let given = Cli::command().get_matches();
     let Cli { common, command } = Cli::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
     let source = given.value_source("endpoint");
@@ -798,9 +813,6 @@ fn dispatch(common: &Common, command: CliCommand) -> anyhow::Result<Exit> {
         CliCommand::Link(LinkCommand::Sniff(args)) => commands::link::sniff::sniff(common, &args),
         CliCommand::Stage(StageCommand::Check(args)) => commands::stage::check(common, &args),
         CliCommand::Validate(args) => Ok(commands::validate::validate(common, &args)),
-        CliCommand::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "tactus", &mut std::io::stdout());
-            Ok(Exit::Done)
-        }
+        CliCommand::Completions { shell } => completion::register(&shell.to_string()),
     }
 }

@@ -1,4 +1,4 @@
-//! The exit codes: 0 done; 1 failed; 2 usage; 3 done, but something was lost; 4 refused by safety; 5 not possible now.
+//! The exit codes.
 
 use std::fmt;
 use std::process::ExitCode;
@@ -10,11 +10,17 @@ use crate::source_line::with_source_line;
 /// How the program ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exit {
+    /// Done.
     Done = 0,
+    /// Failed: the message says what, where, and what to do.
     Failed = 1,
+    /// Usage: a wrong command line, file or script. Nothing was done.
     Usage = 2,
+    /// Done, but something was lost or is missing; the message says what.
     Degraded = 3,
+    /// Refused by safety: a limit, or a reset that is needed. The refused step was not done.
     Refused = 4,
+    /// Not now: another run is in progress, or another client holds the lease.
     NotNow = 5,
 }
 

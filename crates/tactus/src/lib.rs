@@ -4,6 +4,7 @@
 
 mod cli;
 mod commands;
+mod completion;
 mod connection;
 mod exit;
 mod interrupt;
@@ -12,4 +13,4 @@ mod progress;
 mod sha256;
 mod source_line;
 
-pub use cli::main;
+pub use cli::{command, main};

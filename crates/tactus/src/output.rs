@@ -38,6 +38,11 @@ pub(crate) fn say(line: &str) {
     let _gone = writeln!(std::io::stdout().lock(), "{line}");
 }
 
+/// Prints the command that a person is likely to want next, as the last line.
+pub(crate) fn say_next(what: &str) {
+    say(&format!("next: {what}"));
+}
+
 /// Writes a long text to standard output. A closed pipe is not an error.
 pub(crate) fn write(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();

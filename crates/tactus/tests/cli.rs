@@ -1,6 +1,8 @@
 //! What the program says of itself.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+use std::fs;
+use std::path::Path;
 use std::process::{Command, Output};
 
 fn tactus(args: &[&str]) -> Output {
@@ -39,10 +41,51 @@ fn the_help_names_every_command() {
 
 #[test]
 fn completions_are_there_for_each_shell() {
-    for (shell, word) in [("bash", "complete"), ("zsh", "#compdef tactus"), ("fish", "complete -c tactus")] {
+    for (shell, word) in [
+        ("bash", "complete"),
+        ("zsh", "#compdef tactus"),
+        ("fish", "complete --keep-order --exclusive --command tactus"),
+    ] {
         let completions = tactus(&["completions", shell]);
         assert!(completions.status.success());
         assert!(String::from_utf8(completions.stdout).unwrap().contains(word), "{shell}");
+    }
+}
+
+/// What bash is offered for the last of the words, besides options.
+fn offered(folder: &Path, words: &[&str]) -> Vec<String> {
+    let mut asked = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    asked.env("COMPLETE", "bash").env("_CLAP_COMPLETE_INDEX", words.len().to_string());
+    // Nothing is served there.
+    asked.env("_CLAP_IFS", "\n").env("TACTUS_ENDPOINT", "tcp/127.0.0.1:1");
+    let said = asked.arg("--").arg("tactus").args(words).current_dir(folder).output().unwrap();
+    assert!(said.status.success(), "{said:?}");
+    let lines = String::from_utf8(said.stdout).unwrap();
+    lines.lines().filter(|line| !line.starts_with("--")).map(str::to_owned).collect()
+}
+
+#[test]
+fn completions_know_experiments_rigs_and_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = "20260101-120000-corners-0a1b";
+    for (path, text) in
+        [("mine.star", ""), ("config/rigs/bench.toml", ""), (&format!("runs/set/{run}/recording.mcap"), "")]
+    {
+        let path = folder.path().join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    let offered = |words: &[&str]| offered(folder.path(), words);
+    assert_eq!(offered(&["run", "co"]), ["corners"]);
+    let experiments = offered(&["plan", ""]);
+    for name in ["corners", "diagnose", "mine.star"] {
+        assert!(experiments.iter().any(|one| one == name), "{name} in {experiments:?}");
+    }
+    for words in [&["rerun", ""][..], &["run", "--continue", "2026"], &["runs", "tag", "20"]] {
+        assert_eq!(offered(words), [run], "{words:?}");
+    }
+    for words in [&["run", "--rig-file", "config/rigs/b"][..], &["devices", "--rig", "config/rigs/b"]] {
+        assert_eq!(offered(words), ["config/rigs/bench.toml"], "{words:?}");
     }
 }
 

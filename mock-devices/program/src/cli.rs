@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 
 use anyhow::{Context, Result, bail};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use serde_json::json;
 use tactus_device::SensorCodec;
 use tactus_log::LogFormat;
@@ -26,7 +26,7 @@ use crate::usb::UsbArgs;
 /// Virtual sensor and stage that speak real device bytes.
 #[derive(Debug, Parser)]
 #[command(name = "tactus-mock", version)]
-pub(crate) struct Cli {
+struct Cli {
     #[command(subcommand)]
     command: MockCommand,
 }
@@ -128,12 +128,21 @@ impl Source {
     }
 }
 
+/// The commands and their options.
+pub fn command() -> clap::Command {
+    Cli::command()
+}
+
+/// Runs `tactus-mock` with the process's arguments.
+///
+/// # Errors
+/// The message names the file and the place that are wrong, or what the system refused.
+pub fn main() -> Result<()> {
+    Cli::parse().run()
+}
+
 impl Cli {
-    /// Runs the command.
-    ///
-    /// # Errors
-    /// The message names the file and the place that are wrong, or what the system refused.
-    pub(crate) fn run(self) -> Result<()> {
+    fn run(self) -> Result<()> {
         match self.command {
             MockCommand::Rig(args) => in_runtime(serve(args)),
             MockCommand::Usb(args) => in_runtime(args.serve()),

@@ -1,11 +1,5 @@
-//! The program `tactus-mock`: a virtual rig at pseudo-terminals or on USB; test data with hidden physics.
-
-mod cli;
-mod hidden;
-mod usb;
-
-use clap::Parser;
+//! `tactus-mock`: virtual devices.
 
 fn main() -> anyhow::Result<()> {
-    cli::Cli::parse().run()
+    tactus_mock::main()
 }

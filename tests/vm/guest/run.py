@@ -9,7 +9,7 @@ from pathlib import Path
 import lab
 
 # Short ones first.
-ORDER = ["enumeration", "hid", "bulk", "streaming", "transports", "readme", "ftdi", "unplug", "rates", "trouble"]
+ORDER = ["enumeration", "hid", "bulk", "streaming", "transports", "book", "ftdi", "unplug", "rates", "trouble"]
 
 
 def main(chosen: list[str]) -> int:

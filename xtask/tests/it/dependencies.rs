@@ -52,13 +52,13 @@ const NEVER: [(&str, &[&str]); 8] = [
 ];
 
 /// Who may be built from the crates of `mock-devices`: the service embeds virtual devices with their hidden physics,
-/// benchmarks score on sets, and only `tactus-mock` has all of it.
+/// benchmarks score on sets, and only `tactus-mock` has all of it. `xtask` asks that program for its options.
 const MAY_USE_MOCK: [(&str, &[&str]); 5] = [
     ("tactus-hidden", &["tactus-virtual", "tactus-sets", "tactus-mock", "tactus-bench"]),
     ("tactus-virtual", &["tactus-usbip", "tactus-mock", "tactus-runner"]),
     ("tactus-usbip", &["tactus-mock"]),
     ("tactus-sets", &["tactus-mock", "tactus-bench"]),
-    ("tactus-mock", &[]),
+    ("tactus-mock", &["xtask"]),
 ];
 
 fn metadata() -> Metadata {

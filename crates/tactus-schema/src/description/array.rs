@@ -8,14 +8,23 @@ use super::{WrongField, wrong};
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawArray {
+    /// Name of the array.
     name: String,
+    /// Number of rows.
     rows: usize,
+    /// Number of columns.
     cols: usize,
+    /// Sides of an element's active rectangle along x and y.
     element_mm: [f64; 2],
+    /// x of each column's centre, rising, in the sensor's frame.
     col_centres_mm: Vec<f64>,
+    /// y of each row's centre, rising, in the sensor's frame.
     row_centres_mm: Vec<f64>,
+    /// Frames per second of the device.
     rate_hz: f64,
+    /// Greatest reading.
     full_scale_counts: f64,
+    /// Step of the converter.
     step_counts: f64,
 }
 

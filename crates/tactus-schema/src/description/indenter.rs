@@ -13,15 +13,21 @@ use super::{WrongField, positive, wrong};
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawIndenter {
+    /// `"cylinder"`, `"sphere"`, `"cone"`, `"box"` or `"mesh"`.
     shape: Shape,
+    /// Diameter of a cylinder, sphere or cone.
     #[serde(skip_serializing_if = "Option::is_none")]
     diameter_mm: Option<f64>,
+    /// Full angle at a cone's tip.
     #[serde(skip_serializing_if = "Option::is_none")]
     apex_deg: Option<f64>,
+    /// Sides of a box along x and y.
     #[serde(skip_serializing_if = "Option::is_none")]
     size_mm: Option<[f64; 2]>,
+    /// Vertices of a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     vertices_mm: Option<Vec<[f64; 3]>>,
+    /// Triangles of a mesh: three indices of vertices each.
     #[serde(skip_serializing_if = "Option::is_none")]
     triangles: Option<Vec<[u32; 3]>>,
 }

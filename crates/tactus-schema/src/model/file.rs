@@ -18,8 +18,11 @@ pub const SCHEMA: &str = "tactus.model/1";
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawModel {
+    /// `"tactus.model/1"`.
     schema: String,
+    /// The base model's numbers.
     base: RawBase,
+    /// `[[effect]]`: the effects, in the order in which they act.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     effects: Vec<RawEffect>,
 }
@@ -27,18 +30,29 @@ struct RawModel {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawBase {
+    /// Counts per mm when the reference indenter presses the element's own centre: one number, or one for
+    /// each element.
     sensitivity_counts_per_mm: OneOrEach,
+    /// Its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     sensitivity_counts_per_mm_se: Option<OneOrEach>,
+    /// `k` of the response `R(u) = u + k u^2`: one number, or one for each element.
     quadratic_per_mm: OneOrEach,
+    /// Its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     quadratic_per_mm_se: Option<OneOrEach>,
+    /// Counts without load: one number, or one for each element.
     baseline_counts: OneOrEach,
+    /// Its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     baseline_counts_se: Option<OneOrEach>,
+    /// Standard deviation of an element's noise.
     noise_rms_counts: f64,
+    /// The array, as in a rig file.
     array: RawArray,
+    /// How the covering spreads a press.
     psf: RawPsf,
+    /// With which tool and covering the sensitivity is.
     sensitivity_reference: RawReference,
 }
 
@@ -46,10 +60,14 @@ struct RawBase {
 #[serde(deny_unknown_fields)]
 #[expect(clippy::struct_field_names, reason = "the names are the file's")]
 struct RawPsf {
+    /// Spread without a covering: Eq. 4, in mm.
     sigma_intercept_mm: f64,
+    /// Its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     sigma_intercept_mm_se: Option<f64>,
+    /// By how much it grows with each mm of covering.
     sigma_per_mm: f64,
+    /// Its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     sigma_per_mm_se: Option<f64>,
 }
@@ -57,14 +75,18 @@ struct RawPsf {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawReference {
+    /// Thickness of the covering.
     covering_mm: f64,
+    /// The tool, as in a rig file.
     indenter: RawIndenter,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawEffect {
+    /// Name of the effect, of the library or of the draft.
     name: String,
+    /// Its parameters by name; the units are in the names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     parameters: BTreeMap<String, f64>,
     /// Places and values, by the keys of the effect's curve.
@@ -73,8 +95,10 @@ struct RawEffect {
     /// Tables in place of parameters, by their names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     tables: BTreeMap<String, RawTable>,
+    /// Standard errors of parameters.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     standard_errors: BTreeMap<String, f64>,
+    /// What has put it there: the data, and the residual on held-out presses before and after.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     evidence: Option<RawEvidence>,
     /// What it is, if the library does not name it.

@@ -22,28 +22,47 @@ pub const SCHEMA: &str = "tactus.rig/1";
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawRig {
+    /// `"tactus.rig/1"`.
     schema: String,
+    /// Name of the rig, a part of the keys on the bus: letters, digits, `-` and `_`.
     name: String,
+    /// True if no physical device is behind it; its data then say so.
     simulated: bool,
+    /// The array.
     array: RawArray,
+    /// Where the array lies in the robot's frame.
     registration: RawRegistration,
+    /// How the covering spreads a press.
     psf: RawPsf,
+    /// Counts per mm when the reference indenter presses the element's own centre: one number, or one for
+    /// each element. Negative for elements that fall.
     sensitivity_counts_per_mm: OneOrEach,
+    /// With which tool and covering that sensitivity is.
     sensitivity_reference: RawReference,
+    /// Counts without load: one number, or one for each element.
     baseline_counts: OneOrEach,
+    /// The tools by their names.
     indenters: BTreeMap<String, RawIndenter>,
+    /// Name of the tool on the stage; without the key, that of the reference.
     indenter: Option<String>,
+    /// The covering in place; without the table, that of the reference.
     covering: Option<RawCovering>,
+    /// Bounds that no script, client or fault may cross. A service needs this table and the next four.
     #[serde(skip_serializing)]
     envelope: Option<RawEnvelope>,
+    /// How the stage moves; speeds within the envelope's.
     #[serde(skip_serializing)]
     motion: Option<RawMotion>,
+    /// What to do when something is lost.
     #[serde(skip_serializing)]
     policy: Option<RawPolicy>,
+    /// The link to the sensor.
     #[serde(skip_serializing)]
     sensor: Option<RawSensorLink>,
+    /// The link to the stage.
     #[serde(skip_serializing)]
     stage: Option<RawStageLink>,
+    /// What the virtual devices of a simulated rig hide. The service does not read it.
     #[serde(skip_serializing)]
     simulation: Option<RawSimulation>,
 }
@@ -51,20 +70,25 @@ struct RawRig {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawPsf {
+    /// Spread without a covering: Eq. 4, in mm.
     sigma_intercept_mm: f64,
+    /// By how much it grows with each mm of covering.
     sigma_per_mm: f64,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawReference {
+    /// Name of the tool.
     indenter: String,
+    /// Thickness of the covering.
     covering_mm: f64,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawCovering {
+    /// Thickness of the covering.
     thickness_mm: f64,
 }
 

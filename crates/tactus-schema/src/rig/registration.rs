@@ -8,7 +8,9 @@ use crate::description::{WrongField, finite};
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawRegistration {
+    /// The sensor's origin in the robot's frame.
     origin_mm: [f64; 2],
+    /// Rotation of the sensor in the robot's frame, counter-clockwise.
     rotation_deg: f64,
 }
 

@@ -49,7 +49,10 @@ pub(super) struct RawMotion {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawPolicy {
+    /// What a run does when frames are lost in a press: `"repeat"` retracts, waits for the sensor and starts
+    /// the press again; `"fail"` retracts and fails.
     on_gap: RawOnGap,
+    /// How long the service waits for a lost device before the run fails.
     reconnect_s: f64,
 }
 
@@ -63,10 +66,15 @@ enum RawOnGap {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawSensorLink {
+    /// `"weiss-dsa"`, `"singletact"`, `"anyskin"` or `"declared"`.
     protocol: RawSensorProtocol,
+    /// How bytes get to the sensor.
     transport: RawTransport,
+    /// Of `weiss-dsa`: `"crc"`, the default, or `"sum8"` for older firmware.
     checksum: Option<RawWeissChecksum>,
+    /// Of `singletact`: the address of each element.
     addresses: Option<Vec<u16>>,
+    /// Of `declared`: the file that describes the frames, relative to the rig file.
     format: Option<String>,
 }
 

@@ -18,12 +18,16 @@ pub(super) struct RawSimulation {
     quadratic_per_mm: f64,
     surface_mm: f64,
     registration_error: RawRegistration,
+    /// Elements that answer for others: `{ element = 18, answers_for = 19 }`.
     #[serde(default)]
     miswired: Vec<RawMiswired>,
+    /// Elements that do not respond to presses; they still have noise.
     #[serde(default)]
     dead: Vec<usize>,
+    /// Elements that always read the same: `{ element = 5, counts = 812 }`.
     #[serde(default)]
     stuck: Vec<RawStuck>,
+    /// Elements with a noise of their own: `{ element = 7, noise_rms_counts = 25.0 }`.
     #[serde(default)]
     noisy: Vec<RawNoisy>,
     stage: RawSimulatedStage,

@@ -116,18 +116,29 @@ pub struct ZaberAxis {
 #[derive(Debug, Deserialize)]
 #[serde(tag = "protocol", rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum RawStageLink {
+    /// Grbl 1.1 and grblHAL.
     Grbl {
+        /// How bytes get to the controller.
         transport: RawTransport,
+        /// The axes of the robot's frame that differ from the controller's.
         #[serde(default)]
         axes: RawAxes<RawGrblAxis>,
+        /// True if the controller must have its soft limits on, as without the key.
         soft_limits: Option<bool>,
     },
+    /// Zaber devices with firmware 6 and 7.
     ZaberAscii {
+        /// How bytes get to the controller.
         transport: RawTransport,
+        /// The axes of the robot's frame: z, and x and y where the stage has them.
         axes: RawAxes<RawZaberAxis>,
+        /// Acceleration along the path; without the key the axes keep their settings.
         accel_mm_per_s2: Option<f64>,
+        /// Speed of each axis during homing; without the key that of the last move.
         homing_speed_mm_per_s: Option<f64>,
+        /// True if both sides send checksums, as without the key.
         checksums: Option<bool>,
+        /// True if a stage that reports a valid reference counts as homed when it is connected.
         #[serde(default)]
         trusts_reference: bool,
     },
@@ -144,10 +155,15 @@ pub(super) struct RawAxes<A> {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawGrblAxis {
+    /// The controller's axis that moves it; without the key the one of the same name.
     machine_axis: Option<MachineAxis>,
+    /// -1 if the controller counts the other way, else 1.
     direction: Option<i64>,
     origin_mm: Option<f64>,
+    /// Steps per mm that the controller must be set to; without the key they are not checked.
     steps_per_mm: Option<f64>,
+    /// `"low"` or `"high"`: the end of the axis where its home switch must be. That of z is always the high
+    /// end.
     home: Option<AxisEnd>,
 }
 
@@ -157,8 +173,11 @@ pub(super) struct RawZaberAxis {
     device: i64,
     axis: i64,
     um_per_microstep: f64,
+    /// -1 if the device counts the other way, else 1.
     direction: Option<i64>,
     origin_microsteps: Option<i32>,
+    /// `resolution` that the device must be set to, in microsteps per full step; without the key it is not
+    /// checked.
     resolution: Option<i64>,
 }
 

@@ -211,28 +211,48 @@ fn quoted(text: &str) -> String {
 #[derive(Debug, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum RawTransport {
+    /// The rig's own virtual device, in the service's process.
     Embedded,
+    /// A serial port or pseudo-terminal, by `path` or by `usb`.
     Serial {
+        /// The port's path, best a stable one in `/dev/serial/by-id`.
         path: Option<String>,
+        /// The port of this USB device, under whatever path.
         usb: Option<RawIdentity>,
+        /// Bits per second.
         baud: u32,
     },
+    /// A USB interface without a driver of the system's own.
     Usb {
+        /// The vendor's USB id.
         vid: i64,
+        /// The vendor's id of the product.
         pid: i64,
+        /// Serial number of the device; without the key any.
         serial: Option<String>,
+        /// Number of the interface.
         interface: i64,
+        /// Address of the endpoint that is read, 0x81 to 0x8F.
         endpoint_in: i64,
+        /// Address of the endpoint that is written, 0x01 to 0x0F; without the key nothing is written.
         endpoint_out: Option<i64>,
     },
+    /// A human interface device.
     Hid {
+        /// The vendor's USB id.
         vid: i64,
+        /// The vendor's id of the product.
         pid: i64,
+        /// Serial number of the device; without the key any.
         serial: Option<String>,
+        /// Number of its interface, for a device that has several.
         interface: Option<i64>,
+        /// Length of the longest report in bytes, with its id if it has one.
         report_bytes: Option<i64>,
     },
+    /// A serial server.
     Tcp {
+        /// `HOST:PORT`.
         address: String,
     },
 }
@@ -240,8 +260,11 @@ pub(super) enum RawTransport {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawIdentity {
+    /// The vendor's USB id.
     vid: i64,
+    /// The vendor's id of the product.
     pid: i64,
+    /// Serial number of the device; without the key any.
     serial: Option<String>,
 }
 

@@ -9,7 +9,7 @@ use tactus_schema::{pb, with_message};
 use crate::cli::{Common, LeaseArgs, ResumeArgs, StopArgs};
 use crate::connection::{self, PATIENCE};
 use crate::exit::{Exit, Failure};
-use crate::output::{duration, print_fields};
+use crate::output::{duration, print_fields, say_next};
 
 /// How long to wait for `reset`: homing is slow.
 const HOMING_PATIENCE: Duration = Duration::from_mins(2);
@@ -210,6 +210,29 @@ fn print(reply: &pb::CommandReply) {
         ("service", format!("version {}, up {}", reply.version, duration(health.uptime_s))),
     ]);
     print_fields(&fields);
+    if let Some(next) = next_command(&state) {
+        say_next(&next);
+    }
+}
+
+/// What a person is likely to do in this state of the service; a fault says it itself.
+fn next_command(state: &pb::RunState) -> Option<String> {
+    if !state.fault.is_empty() {
+        return None;
+    }
+    match state.phase() {
+        pb::RunPhase::Finished if state.exit_status() == pb::ExitStatus::Stopped => {
+            Some(format!("`tactus run --continue {}` goes on with it", state.run_id))
+        }
+        pb::RunPhase::Idle | pb::RunPhase::Unspecified | pb::RunPhase::Finished => {
+            Some("`tactus run EXPERIMENT` runs one of `tactus experiments`".to_owned())
+        }
+        pb::RunPhase::Paused => Some("`tactus resume` continues, `tactus stop` ends the run".to_owned()),
+        pb::RunPhase::Preparing | pb::RunPhase::Running => {
+            Some("`tactus watch` shows it live, `tactus pause` and `tactus stop` hold and end it".to_owned())
+        }
+        pb::RunPhase::Stopping => None,
+    }
 }
 
 /// The limit of depth, and what the safety supervisor did last.

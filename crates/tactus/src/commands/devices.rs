@@ -77,7 +77,7 @@ impl Rigs {
     /// Adds the rigs of the folders, or the one that has this name.
     fn search(&mut self, name: Option<&str>) -> anyhow::Result<()> {
         let mut names = Vec::new();
-        for file in FOLDERS.iter().flat_map(|folder| toml_files(Path::new(folder))) {
+        for file in rig_files() {
             match config::load_rig(&file) {
                 Ok(RigFiles { rig, .. }) => {
                     if name.is_none_or(|name| name == rig.name) {
@@ -140,6 +140,11 @@ impl Link {
             }
         }
     }
+}
+
+/// The rig files of the folders.
+pub(crate) fn rig_files() -> Vec<PathBuf> {
+    FOLDERS.iter().flat_map(|folder| toml_files(Path::new(folder))).collect()
 }
 
 fn unknown_rig(name: &str, names: &[String]) -> String {

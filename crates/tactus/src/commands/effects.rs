@@ -12,7 +12,7 @@ use tactus_schema::draft::{DraftStatus, stage_name};
 use crate::cli::{Common, EffectsArgs, EffectsCommand};
 use crate::commands::library::Held;
 use crate::exit::{Exit, Failure};
-use crate::output::{print_fields, print_table, say};
+use crate::output::{print_fields, print_table, say, say_next};
 
 pub(crate) fn effects(common: &Common, args: &EffectsArgs) -> anyhow::Result<Exit> {
     let held = args.library.read()?;
@@ -55,6 +55,8 @@ fn list(common: &Common, held: &[Held]) {
         [&draft.name, stage_name(draft.stage()), status.name(), &draft.sentence].map(str::to_owned).to_vec()
     });
     print_table(&["effect", "stage", "status", "what it is"], &library.chain(drafts).collect::<Vec<_>>());
+    say("");
+    say_next("`tactus effects show NAME` explains one");
 }
 
 fn show(common: &Common, held: &[Held], name: &str) -> anyhow::Result<()> {

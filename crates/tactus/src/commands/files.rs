@@ -10,7 +10,7 @@ use tactus_schema::pb;
 use crate::cli::{Common, ExportArgs, RecoverArgs, ReportArgs};
 use crate::commands::run::write_report;
 use crate::exit::{Exit, Failure, in_words};
-use crate::output::{duration, print_fields, print_table};
+use crate::output::{duration, print_fields, print_table, say_next};
 
 /// The exit status of a run whose service died, as recordings tell it.
 const CRASHED: &str = pb::ExitStatus::Crashed.word();
@@ -22,6 +22,7 @@ pub(crate) fn info(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
         println!("{}", serde_json::to_string(&info)?);
     } else {
         println!("{info}");
+        say_next(&format!("`tactus export {}` writes its table", file.display()));
     }
     Ok(tell_lacks(file, &info))
 }
@@ -106,6 +107,10 @@ pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit>
             ("rows", summary.rows.to_string()),
             ("runs", summary.runs.to_string()),
         ]);
+        if format == TableFormat::Parquet {
+            let table = out.display();
+            say_next(&format!("`tactus calibrate {table}` or `tactus discover {table}` analyses it"));
+        }
     }
     Ok(if summary.warnings.is_empty() { Exit::Done } else { Exit::Degraded })
 }
@@ -180,6 +185,7 @@ pub(crate) fn recover(common: &Common, args: &RecoverArgs) -> anyhow::Result<Exi
             println!("rebuilt from the rest: {what}");
         }
         println!("{}", recovery.info);
+        say_next(&format!("`tactus export {}` writes its table", out.display()));
     }
     let lacks = recovery.is_lossy || recovery.frames_missing > 0;
     if lacks {

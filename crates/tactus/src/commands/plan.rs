@@ -17,7 +17,7 @@ use super::run::experiment;
 use crate::cli::{Common, PlanArgs};
 use crate::connection::{self, PATIENCE};
 use crate::exit::{Exit, Failure, at_source};
-use crate::output::{duration, print_fields, print_table};
+use crate::output::{duration, print_fields, print_table, say, say_next};
 use crate::source_line::with_source_line;
 
 /// Default seed, so that repeated plans agree.
@@ -56,13 +56,29 @@ fn plan_of(common: &Common, args: &PlanArgs, script: Script, arguments: Argument
         println!("{name}: {summary}\n");
         print(&rig, &whose, &parameters, &values, &plan);
         if plan.is_possible() {
-            println!("\n`tactus run {}` does it", args.experiment.experiment);
+            say("");
+            say_next(&format!("`{}` does it", run_command(args)));
         } else {
             let message = &plan.outcome.message;
             println!("\n{}", with_source_line(message, &name, &source));
         }
     }
     Ok(Exit::of_run(plan.outcome.exit_status))
+}
+
+/// The command that runs what was planned.
+fn run_command(args: &PlanArgs) -> String {
+    let PlanArgs { experiment, embedded, rig_file } = args;
+    let mut words = vec!["tactus".to_owned(), "run".to_owned(), experiment.experiment.clone()];
+    words.extend(experiment.parameters.iter().flat_map(|parameter| ["-p".to_owned(), parameter.clone()]));
+    words.extend(experiment.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
+    words.extend(embedded.then(|| "--embedded".to_owned()));
+    words.extend(rig_file.iter().flat_map(|file| ["--rig-file".to_owned(), file.display().to_string()]));
+    let as_typed = |word: &String| {
+        let is_plain = word.chars().all(|letter| letter.is_alphanumeric() || "-_=./,:[]".contains(letter));
+        if is_plain { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+    };
+    words.iter().map(as_typed).collect::<Vec<_>>().join(" ")
 }
 
 /// The rig that would run the experiment.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tactus_calibrate::{Estimate, FaultKind, FaultyElement};
 
 use super::Calibrated;
-use crate::output::{print_fields, print_table, say};
+use crate::output::{print_fields, print_table, say, say_next};
 
 pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
     let Calibrated { rig, simulated, notes, calibration, .. } = calibrated;
@@ -90,6 +90,9 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
     }
     for path in paths {
         say(&path.display().to_string());
+    }
+    if let Some(model) = paths.iter().find(|path| path.ends_with("model.toml")) {
+        say_next(&format!("`tactus simulate --model {}` shows an image of this sensor", model.display()));
     }
 }
 

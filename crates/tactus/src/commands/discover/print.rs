@@ -10,7 +10,7 @@ use tactus_report::discovery::{
 };
 
 use crate::commands::calibrate::{estimate, faulty};
-use crate::output::{duration, print_fields, print_table, say};
+use crate::output::{duration, print_fields, print_table, say, say_next};
 
 /// Parameters of one term that fit on a line.
 const PARAMETERS_MAX: usize = 6;
@@ -64,6 +64,12 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
     say("");
     for path in paths {
         say(&path.display().to_string());
+    }
+    let file = |name: &str| paths.iter().find(|path| path.ends_with(name));
+    if let Some(draft) = file("draft-1.toml") {
+        say_next(&format!("`tactus effects add {}` lets every discovery try the draft", draft.display()));
+    } else if let Some(model) = file("model.toml") {
+        say_next(&format!("`tactus simulate --model {}` shows an image of this sensor", model.display()));
     }
 }
 

@@ -1,5 +1,5 @@
-"""README, "Connect your hardware", step by step, with a kit that sends packets and a stage. The commands are taken from the README;
-only devices and files are changed in them."""
+"""The book, "Connect your hardware" and "Your own sensor", step by step, with a kit that sends packets and a stage. The commands are taken
+from the pages; only devices and files are changed in them."""
 
 import json
 import re
@@ -10,21 +10,20 @@ from check_enumeration import BULK_LINK
 from check_streaming import run_on
 from lab import BINARIES, LIMIT_S, REPOSITORY, Folder, Service, at_least, check, plug, that, until_gone, wait
 
-SECTION = re.compile(r"^## Connect your hardware\n(.*?)^## ", re.MULTILINE | re.DOTALL)
+PAGES = ("hardware.md", "sensor.md")
 
 
 def commands() -> list[str]:
-    """Every command line of the section."""
-    section = SECTION.search((REPOSITORY / "README.md").read_text())[1]
-    lines = [line.strip() for line in section.splitlines() if line.startswith("    tactus ")]
-    return lines + re.findall(r"`(tactus [^`]*)`", section.replace("\n", " "))
+    """Every command line of the pages."""
+    text = "\n".join((REPOSITORY / "docs/book/how-to" / page).read_text() for page in PAGES)
+    return [line for line in text.splitlines() if line.startswith("tactus ")]
 
 
 def do(folder: Path, begin: str, *also: str, **changes: str) -> subprocess.CompletedProcess:
-    """Runs the README's command that starts with `begin`; `changes` maps texts of the command to their replacements."""
+    """Runs the book's command that starts with `begin`; `changes` maps texts of the command to their replacements."""
     command = next((line for line in commands() if line.startswith(begin)), None)
     if command is None:
-        raise ValueError(f"the README has no command {begin!r}")
+        raise ValueError(f"the book has no command {begin!r}")
     for old, new in changes.items():
         command = command.replace(old, new)
     words = [*command.split()[1:], *also]
@@ -44,7 +43,7 @@ def rig_of(transports: dict[str, str]) -> str:
 
 
 def check_connect_your_hardware():
-    """readme: from two newly plugged-in devices to a run"""
+    """book: from two newly plugged-in devices to a run"""
     with Folder() as folder, plug("--sensor", "bulk", "--link", BULK_LINK, "--stage", "cdc-acm"):
         transports = {}
 
@@ -63,12 +62,12 @@ def check_connect_your_hardware():
 
         kit = BULK_LINK.read_text()
         (folder / "my-kit.toml").write_text(kit.replace("init = 0xFFFF", "init = 0x0000").replace("0x29B1", "0x31C3"))
-        done = do(folder, "tactus link check", "--json")
+        done = do(folder, "tactus link check my-kit.toml --capture", "--json")
         report = json.loads(done.stdout)["capture"]
         check("with a wrong checksum in the description no frame decodes, and the report says so", [1, 0, True],
               [done.returncode, report["frames"], report["first_bad_checksum"] is not None])
         (folder / "my-kit.toml").write_text(kit)
-        done = do(folder, "tactus link check", "--json")
+        done = do(folder, "tactus link check my-kit.toml --capture", "--json")
         report = json.loads(done.stdout)["capture"]
         check("with the right checksum every byte is part of a frame", [0, 0], [done.returncode, report["skipped_bytes"]])
         check("frames in the capture", at_least(60), report["frames"])
@@ -76,7 +75,7 @@ def check_connect_your_hardware():
         (folder / "my-rig.toml").write_text(rig_of(transports))
         config = (REPOSITORY / "config/tactusd.toml").read_text().replace("rigs/sim.toml", "my-rig.toml")
         (folder / "tactusd.toml").write_text(re.sub("^experiments = .*$", "", config, flags=re.MULTILINE))
-        for begin, *also in (("tactus validate my-rig.toml", "tactusd.toml"), ("tactus devices --rig my-rig.toml",),
+        for begin, *also in (("tactus validate my-rig.toml",), ("tactus devices --rig my-rig.toml",),
                              ("tactus stage check", "--yes")):
             done = do(folder, begin, *also)
             check(begin, that("exit status 0", lambda seen: seen[0] == 0), (done.returncode, done.stdout + done.stderr))

@@ -1,0 +1,7 @@
+//! `tactusd`: the lab service. [`service`] composes it of the bus, the engine and `tactus-runner`.
+
+mod inhibitor;
+mod notify;
+mod service;
+
+pub use service::{command, main};
