@@ -76,7 +76,7 @@ fn completions_know_experiments_rigs_and_runs() {
         fs::write(path, text).unwrap();
     }
     let offered = |words: &[&str]| offered(folder.path(), words);
-    assert_eq!(offered(&["run", "co"]), ["corners"]);
+    assert_eq!(offered(&["run", "cor"]), ["corners"]);
     let experiments = offered(&["plan", ""]);
     for name in ["corners", "diagnose", "mine.star"] {
         assert!(experiments.iter().any(|one| one == name), "{name} in {experiments:?}");

@@ -63,7 +63,9 @@ fn call(arg: &Arg) -> String {
 
 fn meaning(arg: &Arg) -> String {
     let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
-    let mut parts = vec![help.replace("\n\n", " ").replace('\n', " ")];
+    let help = help.replace("\n\n", " ").replace('\n', " ");
+    let end = if help.is_empty() || help.ends_with('.') { "" } else { "." };
+    let mut parts = vec![format!("{help}{end}")];
     let values = arg.get_possible_values();
     if !values.is_empty() && arg.get_action().takes_values() {
         let names: Vec<_> = values.iter().map(|value| format!("`{}`", value.get_name())).collect();
