@@ -55,7 +55,9 @@ fn without_paths(text: &str) -> String {
         let Some((name, after)) = after.split_once("`]") else { break };
         out.push_str(before);
         let short = name.rsplit("::").next().unwrap_or(name);
-        out.push_str(&format!("`{short}`"));
+        for part in ["`", short, "`"] {
+            out.push_str(part);
+        }
         rest = after.strip_prefix('(').and_then(|link| link.split_once(')')).map_or(after, |(_, rest)| rest);
     }
     out.push_str(rest);
