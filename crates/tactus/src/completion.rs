@@ -9,7 +9,7 @@ use tactus_bus::{BusError, Client, Credentials, Endpoint};
 use tactus_plan::Script;
 use tactus_runner::experiments as known;
 
-use crate::commands::{devices, runs};
+use crate::commands::devices;
 use crate::connection;
 use crate::exit::{Exit, Failure};
 use crate::output;
@@ -57,7 +57,7 @@ pub(crate) fn rig_files(typed: &OsStr) -> Vec<CompletionCandidate> {
 
 /// Ids of the runs in the usual folder.
 pub(crate) fn run_ids(typed: &OsStr) -> Vec<CompletionCandidate> {
-    let ids = runs::ids(Path::new("runs")).into_iter().map(CompletionCandidate::new);
+    let ids = tactus_runs::ids(Path::new("runs")).into_iter().map(CompletionCandidate::new);
     starting(ids, typed).collect()
 }
 
