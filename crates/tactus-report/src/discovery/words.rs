@@ -180,11 +180,7 @@ pub(super) fn percent(share: f64) -> String {
 /// Such as `83 % +- 6 %` or `99.96 % +- 0.03 %`: the error has one digit at least, and the share as many decimals.
 pub fn closed(Closed { share, standard_error }: Closed) -> String {
     let Some(error) = standard_error else { return percent(share) };
-    let places = if error < 0.000_95 {
-        2
-    } else {
-        usize::from(error < 0.0095)
-    };
+    let places = if error < 0.000_95 { 2 } else { usize::from(error < 0.0095) };
     format!("{} % +- {} %", short(100.0 * share, places), short((100.0 * error).max(0.01), places))
 }
 
