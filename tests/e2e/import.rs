@@ -111,7 +111,9 @@ fn assert_same_estimates(ours: &Value, theirs: &Value, share: f64, path: &str) {
         (Value::Object(ours), Value::Object(theirs)) => {
             if let (Some(value), Some(error)) = (ours.get("value"), ours.get("standard_error")) {
                 let [value, error, other] = [value, error, &theirs["value"]].map(|one| one.as_f64().unwrap());
-                assert!((value - other).abs() <= share * error, "{path}: {value} and {other}, error {error}");
+                // Without an error of its own it is what the other elements have, whose errors are some percent.
+                let most = share * if error > 0.0 { error } else { 0.02 * value.abs() };
+                assert!((value - other).abs() <= most, "{path}: {value} and {other}, error {error}");
                 return;
             }
             for (key, ours) in ours {
