@@ -10,7 +10,7 @@ PAGE = REPOSITORY / "docs/book/how-to/subscribe.md"
 
 
 def test_the_books_subscriber_prints_live_frames(lab):
-    [program] = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+    program, *_ = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
     assert "connect()" in program
     program = program.replace("connect()", f'connect("{lab.endpoint}")')
     reader = subprocess.Popen([sys.executable, "-u", "-c", program], stdout=subprocess.PIPE, text=True)
