@@ -1,4 +1,4 @@
-//! `tactusd`: the lab service. [`service`] composes it of the bus, the engine and `tactus-runner`.
+//! `tactusd`: the lab service. It is composed of the bus, the engine and `tactus-runner`.
 
 mod inhibitor;
 mod notify;
