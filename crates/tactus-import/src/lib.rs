@@ -1,7 +1,7 @@
 //! A lab's own files become measurement tables.
 //!
 //! A mapping file (`tactus.mapping/1`, TOML) says which column of a CSV, npz or MCAP file is what: times, positions, counts, and the
-//! rig. [`import`] then writes the table that `tactus calibrate` and `tactus discover` read; [`propose`] writes a mapping to start from.
+//! rig. [`import`] then writes the table that `tactus calibrate` and `tactus discover` read; [`propose()`] writes a mapping to start from.
 //! Phases are found from the stage's path unless the file has them. Nothing is guessed that the file cannot show: the mapping is asked for it, by its
 //! key. What follows from the readings, or is the paper's, is listed in [`Summary::assumed`].
 //!
