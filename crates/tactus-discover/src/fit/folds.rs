@@ -95,9 +95,10 @@ impl Problem<'_> {
     fn left_by_elements(&self, at: &Fitted) -> Result<Vec<f64>, DiscoverError> {
         let segments = Segments::of(self, &at.parameters);
         let of_fold = |fold: usize| -> Result<Total, DiscoverError> {
-            let of = self.of_elements(|element| element % FOLDS == fold);
-            let own = of.own(&at.parameters);
+            // All free parameters, those of wires that only other folds show as well.
+            let own = self.own(&at.parameters);
             let count = own.len();
+            let of = self.of_elements(|element| element % FOLDS == fold);
             of.sums(&at.parameters, &at.predicted, own, count, Kept::AllAndBlocks, &segments)
         };
         let folds: Vec<Total> = (0..FOLDS).map(of_fold).collect::<Result<_, DiscoverError>>()?;

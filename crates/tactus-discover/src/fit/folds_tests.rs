@@ -151,3 +151,19 @@ fn a_gain_that_jumps_from_press_to_press_is_confirmed_by_elements() {
         gains.iter().fold((0.0, 0.0), |(gained, lost), gain| (gained + gain.max(0.0), lost - gain.min(0.0)));
     assert!(gained > 4.0 * lost, "{gained} {lost}");
 }
+
+#[test]
+fn a_wire_that_one_fold_shows_is_a_parameter_of_all() {
+    let known = known();
+    let (frames, term) = drifted(&known, 9);
+    let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
+    let problem = prepared.problem();
+    let wire = Effect::new(
+        "miswired",
+        [("element", 7.0), ("answers_for", 8.0), ("own_share", 0.9), ("other_share", 0.1)],
+    );
+    let with = prepared.base.parameters.with(term).with(Term::of(&wire.unwrap()));
+    let at = problem.fit_from(with, 4).unwrap();
+    let left = problem.left_by_folds(&at, FoldsOf::Elements).unwrap().unwrap();
+    assert!(left.iter().all(|of_block| of_block.is_finite()) && left.iter().sum::<f64>() > 0.0);
+}
