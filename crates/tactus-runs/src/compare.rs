@@ -31,7 +31,7 @@ pub struct Fact {
 ///
 /// # Errors
 /// If there are fewer than two, or one cannot be read.
-pub fn compare<P: AsRef<Path>>(recordings: &[P]) -> Result<Comparison, RunsError> {
+pub(crate) fn compare<P: AsRef<Path>>(recordings: &[P]) -> Result<Comparison, RunsError> {
     if recordings.len() < 2 {
         return Err(RunsError::TooFew);
     }

@@ -128,11 +128,8 @@ impl Index {
 /// Without it everything is read again, so a folder that cannot be written costs only time.
 fn keep(path: &Path, index: &Index) {
     let Ok(text) = serde_json::to_string(index) else { return };
-    let beside = path.with_extension(format!("{}.part", std::process::id()));
-    let kept = fs::write(&beside, text).and_then(|()| fs::rename(&beside, path));
-    if let Err(error) = kept {
+    if let Err(error) = crate::replace(path, &text) {
         tracing::debug!(%error, path = %path.display(), "the index of runs is not kept");
-        drop(fs::remove_file(&beside));
     }
 }
 

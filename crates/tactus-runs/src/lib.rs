@@ -11,7 +11,9 @@ mod error;
 mod index;
 mod notes;
 
-use std::path::PathBuf;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Value, json};
@@ -19,7 +21,7 @@ use serde_json::{Value, json};
 use index::Index;
 
 pub use again::{Again, again};
-pub use compare::{Comparison, Fact, compare};
+pub use compare::{Comparison, Fact};
 pub use error::RunsError;
 pub use index::{RunEntry, ids};
 pub use notes::{Notes, beside, tag};
@@ -81,20 +83,43 @@ impl RunsFolder {
     /// # Errors
     /// As [`Self::runs`], and if no run or several have this id.
     pub fn find(&self, id: &str) -> Result<ListedRun, RunsError> {
-        let Runs { runs: mut found, .. } = self.runs()?;
-        if let Some(exact) = found.iter().position(|run| run.entry.run_id == id) {
-            return Ok(found.swap_remove(exact));
+        self.among(&self.runs()?.runs, id).cloned()
+    }
+
+    /// Compares the settings and results of runs, each named as in [`Self::find`].
+    ///
+    /// # Errors
+    /// As [`Self::find`], and if there are fewer than two, or one cannot be read.
+    pub fn compare(&self, ids: &[String]) -> Result<Comparison, RunsError> {
+        let Runs { runs, .. } = self.runs()?;
+        let recording = |id: &String| self.among(&runs, id).map(|run| &run.entry.path);
+        compare::compare(&ids.iter().map(recording).collect::<Result<Vec<_>, _>>()?)
+    }
+
+    fn among<'a>(&self, runs: &'a [ListedRun], id: &str) -> Result<&'a ListedRun, RunsError> {
+        if let Some(exact) = runs.iter().find(|run| run.entry.run_id == id) {
+            return Ok(exact);
         }
-        found.retain(|run| !id.is_empty() && run.entry.run_id.contains(id));
-        match (found.pop(), found.as_slice()) {
-            (Some(run), []) => Ok(run),
-            (None, _) => Err(RunsError::Unknown { id: id.to_owned(), folder: self.path.clone() }),
-            (Some(last), rest) => {
-                let ids = rest.iter().chain([&last]).map(|run| run.entry.run_id.clone()).collect();
+        let found: Vec<&ListedRun> =
+            runs.iter().filter(|run| !id.is_empty() && run.entry.run_id.contains(id)).collect();
+        match found[..] {
+            [run] => Ok(run),
+            [] => Err(RunsError::Unknown { id: id.to_owned(), folder: self.path.clone() }),
+            _ => {
+                let ids = found.iter().map(|run| run.entry.run_id.clone()).collect();
                 Err(RunsError::Several { id: id.to_owned(), ids })
             }
         }
     }
+}
+
+/// Puts a text in the place of a file at once. A failure leaves the file as it was.
+fn replace(path: &Path, text: &str) -> io::Result<()> {
+    let part = path.with_extension(format!("{}.part", std::process::id()));
+    fs::write(&part, text).and_then(|()| fs::rename(&part, path)).inspect_err(|_| {
+        // An error of the removal would hide the one that matters.
+        drop(fs::remove_file(&part));
+    })
 }
 
 /// Changes the tags and the note of a run.

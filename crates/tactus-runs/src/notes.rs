@@ -21,6 +21,15 @@ pub struct Notes {
     pub note: String,
 }
 
+impl Notes {
+    /// Puts these tags in the place of all.
+    pub fn set_tags(&mut self, mut tags: Vec<String>) {
+        tags.sort();
+        tags.dedup();
+        self.tags = tags;
+    }
+}
+
 /// The file of a recording.
 pub fn beside(recording: &Path) -> PathBuf {
     recording.with_file_name(NOTES)
@@ -42,13 +51,11 @@ pub(crate) fn change(recording: &Path, change: impl FnOnce(&mut Notes)) -> Resul
     let mut notes = read(recording)?;
     change(&mut notes);
     let path = beside(recording);
-    let part = path.with_extension(format!("{}.part", std::process::id()));
     let text = match toml::to_string(&notes) {
         Ok(text) => text,
         Err(source) => return Err(RunsError::Unwritable { path, source }),
     };
-    let written = fs::write(&part, text).and_then(|()| fs::rename(&part, &path));
-    written.map_err(|source| RunsError::Io { action: "write", path, source })?;
+    crate::replace(&path, &text).map_err(|source| RunsError::Io { action: "write", path, source })?;
     Ok(notes)
 }
 

@@ -95,12 +95,7 @@ impl Runs {
         if ids.len() > COMPARED_MAX {
             return Err(NotRead::Wrong(format!("at most {COMPARED_MAX} runs can be compared")));
         }
-        self.computed(move |folder| {
-            let recordings: Result<Vec<PathBuf>, _> =
-                ids.iter().map(|id| folder.find(id).map(|run| run.entry.path)).collect();
-            Ok(json!(tactus_runs::compare(&recordings?)?))
-        })
-        .await
+        self.computed(move |folder| Ok(json!(folder.compare(&ids)?))).await
     }
 
     pub(crate) async fn mark(&self, id: String, body: &[u8]) -> Result<Value, NotRead> {
@@ -109,13 +104,11 @@ impl Runs {
             return Err(NotRead::Wrong(format!("a note has at most {NOTE_BYTES_MAX} bytes")));
         }
         let tags: Result<Vec<String>, String> = tags.iter().map(|tag| tactus_runs::tag(tag)).collect();
-        let mut tags = tags.map_err(NotRead::Wrong)?;
-        tags.sort();
-        tags.dedup();
+        let tags = tags.map_err(NotRead::Wrong)?;
         self.read(move |folder| {
             let run = folder.find(&id)?;
             let marked = tactus_runs::mark(run, |notes| {
-                notes.tags = tags;
+                notes.set_tags(tags);
                 notes.note = note;
             })?;
             Ok(view(&marked))

@@ -18,8 +18,8 @@
 use nalgebra::DMatrix;
 
 use super::elimination::Elimination;
-use super::knots::bounded;
-use super::parameters::Parameters;
+use super::knots::{bounded, is_of_run_time};
+use super::parameters::{Parameters, Term};
 use super::problem::{Fitted, Free, Problem, least_step};
 use super::scale::Scale;
 use super::sums::{Block, Kept, Segments, Total, add};
@@ -32,16 +32,16 @@ const FOLDS: usize = 5;
 const CLIP: f64 = 4.0;
 
 /// What folds are made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum FoldsOf {
     Presses,
     Elements,
 }
 
 impl FoldsOf {
-    /// Those that can confirm an effect.
-    pub(crate) fn effect(name: &str) -> Self {
-        if name == "gain-drift" { Self::Elements } else { Self::Presses }
+    /// Those that can confirm an effect: a line in the run's time is the same for all elements.
+    pub(crate) fn effect(term: &Term) -> Self {
+        if term.curve().is_some_and(is_of_run_time) { Self::Elements } else { Self::Presses }
     }
 }
 
@@ -51,6 +51,26 @@ struct Prior {
     /// Where it is centred, counted from the parameter's value.
     centre: f64,
     precision: f64,
+}
+
+/// What is known of all free parameters before a fold is fitted.
+struct Known {
+    priors: Vec<Prior>,
+    /// The least steps that their classes allow.
+    least: Vec<f64>,
+}
+
+impl Known {
+    /// The steps that some folds want.
+    fn steps(&self, others: &Elimination) -> Vec<f64> {
+        let (mut gram, mut right, mut squares) = others.equations();
+        for (one, Prior { centre, precision }) in self.priors.iter().enumerate() {
+            gram[(one, one)] += precision;
+            right[one] += precision * centre;
+            squares[one] = gram[(one, one)].max(squares[one]);
+        }
+        bounded(&gram, &right, 0.0, &squares, &self.least).as_slice().to_vec()
+    }
 }
 
 impl Problem<'_> {
@@ -71,6 +91,7 @@ impl Problem<'_> {
     }
 
     fn left_by_presses(&self, at: &Fitted) -> Result<Vec<f64>, DiscoverError> {
+        let known = self.known(&at.parameters);
         let own = self.own(&at.parameters);
         let count = own.len();
         let segments = Segments::of(self, &at.parameters);
@@ -82,7 +103,7 @@ impl Problem<'_> {
             let others = total.blocks.iter().zip(&press).filter(|(_, press)| !is_in(**press));
             let others = sum(others.map(|(block, _)| block), count, &segments, self);
             let fitted = Elimination::of(self, &others, &segments, &at.parameters);
-            let steps = self.steps_by(&fitted, &at.parameters);
+            let steps = known.steps(&fitted);
             let element = fitted.fitted(&steps);
             let blocks = total.blocks.iter().zip(&press).zip(&mut left);
             for ((block, _), left) in blocks.filter(|((_, press), _)| is_in(**press)) {
@@ -93,6 +114,7 @@ impl Problem<'_> {
     }
 
     fn left_by_elements(&self, at: &Fitted) -> Result<Vec<f64>, DiscoverError> {
+        let known = self.known(&at.parameters);
         let segments = Segments::of(self, &at.parameters);
         let of_fold = |fold: usize| -> Result<Total, DiscoverError> {
             // All free parameters, those of wires that only other folds show as well.
@@ -106,8 +128,7 @@ impl Problem<'_> {
         for (fold, of_fold) in folds.iter().enumerate() {
             let others = folds.iter().enumerate().filter(|(other, _)| *other != fold);
             let others = others.map(|(_, total)| total).fold(of_fold.none(), Total::joined);
-            let steps =
-                self.steps_by(&Elimination::of(self, &others, &segments, &at.parameters), &at.parameters);
+            let steps = known.steps(&Elimination::of(self, &others, &segments, &at.parameters));
             // The elements' own gains and baselines are nobody else's.
             let own = Elimination::of(self, of_fold, &segments, &at.parameters);
             let element = own.fitted(&steps);
@@ -118,16 +139,9 @@ impl Problem<'_> {
         Ok(left)
     }
 
-    /// The steps of the free parameters that some folds want.
-    fn steps_by(&self, others: &Elimination, at: &Parameters) -> Vec<f64> {
-        let (mut gram, mut right, mut squares) = others.equations();
-        for (one, Prior { centre, precision }) in self.priors(at).into_iter().enumerate() {
-            gram[(one, one)] += precision;
-            right[one] += precision * centre;
-            squares[one] = gram[(one, one)].max(squares[one]);
-        }
-        let least: Vec<f64> = self.free(at).iter().map(|one| least_step(at, *one)).collect();
-        bounded(&gram, &right, 0.0, &squares, &least).as_slice().to_vec()
+    fn known(&self, at: &Parameters) -> Known {
+        let least = self.free(at).iter().map(|one| least_step(at, *one)).collect();
+        Known { priors: self.priors(at), least }
     }
 
     /// The priors of a model's free parameters. Coefficients that are 0 without their class have one variance for the class, as in the

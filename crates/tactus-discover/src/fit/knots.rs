@@ -242,6 +242,11 @@ pub(crate) fn table_places(by: By, frames: &Frames, registration: &Registration)
     (most - least > APART_MM).then(|| places.collect())
 }
 
+/// True if a curve is a line in the run's time.
+pub(super) fn is_of_run_time(curve: &FreeCurve) -> bool {
+    (curve.at, curve.kind) == ("at_s", CurveKind::Line)
+}
+
 /// Places of a curve's knots that the frames can tell apart; none if there are too few.
 pub(crate) fn places(curve: &FreeCurve, problem: &Problem<'_>) -> Vec<f64> {
     let (frames, duration_s) = (problem.predictor.frames, problem.duration_s);
@@ -249,7 +254,7 @@ pub(crate) fn places(curve: &FreeCurve, problem: &Problem<'_>) -> Vec<f64> {
     let thickest_mm = frames.covering_mm.iter().copied().fold(0.0, f64::max);
     let depth_mm = deepest_mm.min(thickest_mm).max(f64::MIN_POSITIVE);
     match (curve.at, curve.kind) {
-        ("at_s", CurveKind::Line) => {
+        _ if is_of_run_time(curve) => {
             let count = (presses(frames) / PRESSES_A_KNOT).min(*OF_TIME_LINE.end());
             if OF_TIME_LINE.contains(&count) { even(duration_s, count) } else { Vec::new() }
         }

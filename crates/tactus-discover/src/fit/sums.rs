@@ -243,19 +243,16 @@ impl Problem<'_> {
         let weighed: Vec<usize> =
             (0..elements).filter(|element| self.element_weight[*element] > 0.0).collect();
         let per_bin = weighed.len();
-        // Adds the weighed readings of a bin, times a factor each.
-        let take = |of_bin: &[f64], factors: &[f64], to: &mut Vec<f64>| {
-            if per_bin == elements {
-                to.extend(of_bin.iter().zip(factors).map(|(value, factor)| value * factor));
-            } else {
-                to.extend(weighed.iter().zip(factors).map(|(element, factor)| of_bin[*element] * factor));
-            }
-        };
         // Weighed readings of a column in the part's bins, times the roots of their weights: bin by bin, element by element.
         let rooted = |column: &[f64], roots: &[f64], to: &mut Vec<f64>| {
             for (bin, roots) in part.iter().zip(roots.chunks_exact(per_bin.max(1))) {
                 let start = (bin - chunk.bins.start) * elements;
-                take(&column[start..start + elements], roots, to);
+                let of_bin = &column[start..start + elements];
+                if per_bin == elements {
+                    to.extend(of_bin.iter().zip(roots).map(|(value, root)| value * root));
+                } else {
+                    to.extend(weighed.iter().zip(roots).map(|(element, root)| of_bin[*element] * root));
+                }
             }
         };
         let root = |bin: &usize| {

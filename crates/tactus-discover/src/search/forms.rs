@@ -103,7 +103,7 @@ impl Search<'_> {
     }
 
     /// The added terms of a class.
-    pub(super) fn added<'a>(&self, at: &'a Fitted, name: &'a str) -> impl Iterator<Item = &'a Term> {
+    pub(crate) fn added<'a>(&self, at: &'a Fitted, name: &'a str) -> impl Iterator<Item = &'a Term> {
         let terms = at.parameters.terms.iter().skip(self.known_terms);
         terms.filter(move |term| term.definition.name == name)
     }

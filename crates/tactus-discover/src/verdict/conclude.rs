@@ -1,5 +1,7 @@
 //! The verdict on a search, and the [`Discovery`] that reports it.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
 use tactus_model::{Effect, Response};
@@ -512,7 +514,7 @@ impl Search<'_> {
     ) -> Result<Vec<Step>, DiscoverError> {
         let known_terms = self.problem.predictor.known.effects.len();
         let names = names(&grown.parameters, known_terms);
-        let mut of_grown: Vec<(FoldsOf, Option<Vec<f64>>)> = Vec::new();
+        let mut of_grown: BTreeMap<FoldsOf, Option<Vec<f64>>> = BTreeMap::new();
         let mut steps = Vec::new();
         for name in names {
             let problem = if name == MISWIRED { with_silent } else { self.problem };
@@ -547,13 +549,13 @@ impl Search<'_> {
             };
             let curves = fitted_curves(grown, known_terms, name, refuted.get(name));
             let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
-            let folds = FoldsOf::effect(name);
-            if of_grown.iter().all(|(of, _)| *of != folds) {
-                of_grown.push((folds, self.problem.left_by_folds(grown, folds)?));
-            }
-            let of_grown = of_grown.iter().find(|(of, _)| *of == folds).and_then(|(_, left)| left.as_ref());
+            let folds = self.added(grown, name).next().map_or(FoldsOf::Presses, FoldsOf::effect);
+            let of_grown = match of_grown.entry(folds) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(unknown) => unknown.insert(self.problem.left_by_folds(grown, folds)?),
+            };
             let of_less = self.problem.left_by_folds(&before, folds)?;
-            let by_folds = of_less.zip(of_grown).map(|(less, grown)| gains_by_folds(&less, grown));
+            let by_folds = of_less.zip(of_grown.as_ref()).map(|(less, grown)| gains_by_folds(&less, grown));
             let blocks = by_folds.iter().flatten().filter(|gain| **gain != 0.0).count();
             let least_p = 0.5_f64.powf(blocks as f64);
             let added = AddedEffect {

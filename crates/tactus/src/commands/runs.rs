@@ -17,12 +17,12 @@ pub(crate) fn runs(common: &Common, args: &RunsArgs) -> anyhow::Result<Exit> {
         None => list(common, args),
         Some(RunsCommand::Tag { run, tags, remove }) => {
             let marked = mark(found(folder, run)?, |notes| {
-                notes.tags.retain(|tag| !tags.contains(tag));
+                let mut kept = std::mem::take(&mut notes.tags);
+                kept.retain(|tag| !tags.contains(tag));
                 if !remove {
-                    notes.tags.extend(tags.iter().cloned());
-                    notes.tags.sort();
-                    notes.tags.dedup();
+                    kept.extend(tags.iter().cloned());
                 }
+                notes.set_tags(kept);
             })?;
             Ok(told(common, &marked))
         }
@@ -31,9 +31,7 @@ pub(crate) fn runs(common: &Common, args: &RunsArgs) -> anyhow::Result<Exit> {
             Ok(told(common, &marked))
         }
         Some(RunsCommand::Compare { ids }) => {
-            let found = ids.iter().map(|run| found(folder, run)).collect::<anyhow::Result<Vec<_>>>()?;
-            let recordings: Vec<_> = found.into_iter().map(|run| run.entry.path).collect();
-            Ok(compared(common, &tactus_runs::compare(&recordings)?))
+            Ok(compared(common, &RunsFolder::new(folder).compare(ids).map_err(failure)?))
         }
     }
 }
