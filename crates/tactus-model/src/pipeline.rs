@@ -173,6 +173,33 @@ impl Pipeline {
         self.respond(moment)
     }
 
+    /// A step of which nobody wants the counts: only what the effects remember goes on. [`Pipeline::counts`] are then any.
+    pub fn pass(&mut self, moment: Moment, path: &impl Path) {
+        let moment = self.elapse(moment);
+        match self.stages.remember() {
+            None | Some(PipelineStage::Contact) => {}
+            Some(PipelineStage::Motion) => drop(self.place(moment, path)),
+            Some(PipelineStage::Covering) => {
+                self.press(moment, path);
+                self.cover(moment, |_| ());
+            }
+            Some(PipelineStage::Element | PipelineStage::Readout) => {
+                self.press(moment, path);
+                self.cover(moment, |_| ());
+                self.respond(moment);
+            }
+        }
+    }
+
+    /// As [`Pipeline::pass`], from a contact and a signal of another pipeline.
+    pub fn pass_on(&mut self, moment: Moment, contact: &Contact, signal_mm: &[f64]) {
+        if self.stages.remember() >= Some(PipelineStage::Covering) {
+            self.step_on(moment, contact, signal_mm);
+        } else {
+            self.elapse(moment);
+        }
+    }
+
     /// Advances the time.
     fn elapse(&mut self, Moment { t_s, temperature_c }: Moment) -> Elapsed {
         let dt_s = self.last_s.map_or(0.0, |last_s| (t_s - last_s).max(0.0));
@@ -180,8 +207,8 @@ impl Pipeline {
         Elapsed { t_s, dt_s, temperature_c }
     }
 
-    /// Motion and contact: the signal that reaches the elements.
-    fn press(&mut self, moment: Elapsed, path: &impl Path) {
+    /// Motion: where the tip is.
+    fn place(&mut self, moment: Elapsed, path: &impl Path) -> TipState {
         let base = BaseModel { model: &self.model, covering: self.covering };
         let instant_s = self.stages.motion.iter().fold(moment.t_s, |t_s, effect| effect.instant_s(t_s));
         let mut tip = TipState {
@@ -192,6 +219,13 @@ impl Pipeline {
         for effect in &mut self.stages.motion {
             effect.place(moment.now(base), &mut tip);
         }
+        tip
+    }
+
+    /// Motion and contact: the signal that reaches the elements.
+    fn press(&mut self, moment: Elapsed, path: &impl Path) {
+        let tip = self.place(moment, path);
+        let base = BaseModel { model: &self.model, covering: self.covering };
         let ready = Ready { table: self.table.as_ref(), images: self.images.as_deref() };
         self.pressed.press(&tip, &self.indenter, base, &self.stages, ready);
         for (signal, reached) in self.signal_mm.iter_mut().zip(&self.pressed.reached_mm) {
@@ -298,6 +332,18 @@ impl Pipeline {
 }
 
 impl Stages {
+    /// The last stage with an effect that remembers.
+    fn remember(&self) -> Option<PipelineStage> {
+        let Self { motion, contact: _, covering, element, readout } = self;
+        let stages = [
+            (PipelineStage::Readout, readout.iter().any(|effect| effect.remembers())),
+            (PipelineStage::Element, element.iter().any(|effect| effect.remembers())),
+            (PipelineStage::Covering, covering.iter().any(|effect| effect.remembers())),
+            (PipelineStage::Motion, motion.iter().any(|effect| effect.remembers())),
+        ];
+        stages.into_iter().find(|(_, remembers)| *remembers).map(|(stage, _)| stage)
+    }
+
     fn of(effects: &[Effect]) -> Self {
         let mut stages = Self::default();
         for effect in effects {

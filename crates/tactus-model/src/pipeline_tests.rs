@@ -163,6 +163,59 @@ fn a_step_on_what_another_pipeline_reached_is_the_whole_step_to_the_bit() {
     assert!(strong(find("heavy-tail")).acts_before_signal());
 }
 
+/// Every effect of the library, and with a free curve those that may have one.
+fn all_strong() -> impl Iterator<Item = Effect> {
+    let both = |definition| [Some(strong(definition)), with_knots(definition, |at| 0.1 * at)];
+    REGISTRY.iter().copied().flat_map(both).flatten()
+}
+
+/// Moments of which every third is wanted, while the sensor warms up.
+fn moments() -> impl Iterator<Item = (Moment, bool)> {
+    let moment = |k| Moment { t_s: f64::from(k) / 20.0, temperature_c: Some(20.0 + 0.1 * f64::from(k)) };
+    (0..60).map(move |k| (moment(k), k % 3 == 2))
+}
+
+#[test]
+fn moments_that_nobody_wants_change_nothing_of_the_others() {
+    for effect in all_strong() {
+        for effects in [vec![effect.clone()], vec![strong(find("relaxation")), effect.clone()]] {
+            let simulator = simulator(effects);
+            let way = way(&simulator);
+            let [mut all, mut some] = [(); 2].map(|()| Pipeline::new(&simulator).unwrap());
+            for (moment, is_wanted) in moments() {
+                let want = all.step(moment, &way);
+                if is_wanted {
+                    assert_eq!(some.step(moment, &way), want, "{} at {} s", effect.name(), moment.t_s);
+                } else {
+                    some.pass(moment, &way);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn nor_do_they_on_what_another_pipeline_reached() {
+    let trunk = simulator([]);
+    let way = way(&trunk);
+    for effect in all_strong() {
+        let mut trunk = Pipeline::new(&trunk).unwrap();
+        let branch = simulator([effect.clone()]);
+        let [mut all, mut some] = [(); 2].map(|()| Pipeline::new(&branch).unwrap());
+        for (moment, is_wanted) in moments() {
+            let mut signals_mm = Vec::new();
+            trunk.reach(moment, &way, &mut signals_mm);
+            let want = all.step_on(moment, trunk.contact(), &signals_mm);
+            if is_wanted {
+                let counts = some.step_on(moment, trunk.contact(), &signals_mm);
+                assert_eq!(counts, want, "{} at {} s", effect.name(), moment.t_s);
+            } else {
+                some.pass_on(moment, trunk.contact(), &signals_mm);
+            }
+        }
+    }
+}
+
 fn find(name: &str) -> &'static Definition {
     Definition::find(name).unwrap()
 }

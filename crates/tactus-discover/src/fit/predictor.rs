@@ -47,7 +47,7 @@ impl<'a> Predictor<'a> {
     /// Counts of every bin and element, without noise and rounding.
     pub(crate) fn predict(&self, parameters: &Parameters) -> Result<Vec<f64>, DiscoverError> {
         let mut predicted = Vec::with_capacity(self.bins.len() * self.bins.elements);
-        self.stream(parameters.clone())?.take(self.bins.len(), &mut predicted)?;
+        self.stream(parameters.clone())?.take(self.bins.len(), |_| true, &mut predicted)?;
         Ok(predicted)
     }
 
@@ -132,7 +132,7 @@ pub(crate) struct Stream<'a> {
     from: Option<usize>,
     /// The next bin.
     bin: usize,
-    running: Option<Running>,
+    running: Option<Box<Running>>,
 }
 
 /// What the first stages of a model's pipeline give for some bins. The streams of models that differ only in what follows go on from
@@ -152,12 +152,23 @@ struct Running {
 }
 
 impl Stream<'_> {
-    /// Appends the counts of so many more bins.
-    pub(crate) fn take(&mut self, count: usize, predicted: &mut Vec<f64>) -> Result<(), DiscoverError> {
+    /// Appends the counts of so many more bins; any, for those that are not wanted.
+    pub(crate) fn take(
+        &mut self,
+        count: usize,
+        wanted: impl Fn(usize) -> bool,
+        predicted: &mut Vec<f64>,
+    ) -> Result<(), DiscoverError> {
         let (predictor, first_bin, first) = (self.predictor, self.bin, predicted.len());
         for bin in first_bin..first_bin + count {
             let path = &predictor.bins.paths[predictor.bins.run[bin]];
-            predicted.extend(self.pipeline(bin)?.step(predictor.moment(bin), path));
+            let (moment, pipeline) = (predictor.moment(bin), self.pipeline(bin)?);
+            if wanted(bin) {
+                pipeline.step(moment, path);
+            } else {
+                pipeline.pass(moment, path);
+            }
+            predicted.extend(pipeline.counts());
         }
         self.finish(first_bin, &mut predicted[first..]);
         Ok(())
@@ -168,16 +179,23 @@ impl Stream<'_> {
         &mut self,
         count: usize,
         reached: &Reached,
+        wanted: impl Fn(usize) -> bool,
         predicted: &mut Vec<f64>,
     ) -> Result<(), DiscoverError> {
-        let Some(from) = self.from else { return self.take(count, predicted) };
+        let Some(from) = self.from else { return self.take(count, wanted, predicted) };
         let (predictor, first_bin, first) = (self.predictor, self.bin, predicted.len());
         let elements = predictor.bins.elements;
         let of_bins = reached.signals_mm.chunks_exact(reached.signals_mm.len() / count);
         for ((bin, contact), signals_mm) in (first_bin..first_bin + count).zip(&reached.contacts).zip(of_bins)
         {
             let signal_mm = &signals_mm[from * elements..(from + 1) * elements];
-            predicted.extend(self.pipeline(bin)?.step_on(predictor.moment(bin), contact, signal_mm));
+            let (moment, pipeline) = (predictor.moment(bin), self.pipeline(bin)?);
+            if wanted(bin) {
+                pipeline.step_on(moment, contact, signal_mm);
+            } else {
+                pipeline.pass_on(moment, contact, signal_mm);
+            }
+            predicted.extend(pipeline.counts());
         }
         self.finish(first_bin, &mut predicted[first..]);
         Ok(())
@@ -208,7 +226,7 @@ impl Stream<'_> {
             running
         } else {
             let pipeline = self.predictor.pipeline(&self.parameters, run, tool, covering, &self.effects)?;
-            Running { run, tool, covering_mm, pipeline }
+            Box::new(Running { run, tool, covering_mm, pipeline })
         };
         let running = self.running.insert(running);
         if running.covering_mm.to_bits() != covering_mm.to_bits() {

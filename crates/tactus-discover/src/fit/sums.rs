@@ -26,7 +26,7 @@ use crate::numbers::parallel;
 /// Bins of which all directions are held at a time.
 const CHUNK_BINS: usize = 256;
 /// Directions whose products are computed together.
-const PANEL: usize = 64;
+const PANEL: usize = 128;
 /// Greatest number of blocks whose signs are flipped apart; more are joined.
 const BLOCKS_MAX: usize = 400;
 /// Step of the derivative by the gains.
@@ -171,7 +171,9 @@ impl Problem<'_> {
         for first in (0..bins.len()).step_by(CHUNK_BINS) {
             let range = first..(first + CHUNK_BINS).min(bins.len());
             let reached = trunk.reach(range.len())?;
-            let column = |direction: &Running<'_>| direction.values(range.clone(), &reached, predicted);
+            let wanted = |bin: usize| self.train[bin] > 0.0;
+            let column =
+                |direction: &Running<'_>| direction.values(range.clone(), &reached, &wanted, predicted);
             let mut columns: Vec<Vec<f64>> =
                 parallel::map(&running, column).into_iter().collect::<Result<_, DiscoverError>>()?;
             let by_gain = columns.pop().unwrap_or_default();
@@ -355,6 +357,7 @@ impl Running<'_> {
         &self,
         bins: Range<usize>,
         reached: &Reached,
+        wanted: &impl Fn(usize) -> bool,
         predicted: &[f64],
     ) -> Result<Vec<f64>, DiscoverError> {
         let (stream, per_step) = match self {
@@ -364,7 +367,7 @@ impl Running<'_> {
         };
         let mut stream = stream.lock().unwrap_or_else(PoisonError::into_inner);
         let mut column = Vec::new();
-        stream.take_on(bins.len(), reached, &mut column)?;
+        stream.take_on(bins.len(), reached, wanted, &mut column)?;
         let now = predicted.chunks_exact(column.len() / bins.len()).skip(bins.start).flatten();
         column.iter_mut().zip(now).for_each(|(value, now)| *value = (*value - now) * per_step);
         Ok(column)

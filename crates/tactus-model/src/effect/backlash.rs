@@ -55,6 +55,10 @@ impl OnMotion for Backlash {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         for axis in &mut self.axes {
             axis.at_mm = None;

@@ -98,6 +98,9 @@ impl Crosstalk {
     }
 }
 
+/// Sums that go on side by side.
+const LANES: usize = 4;
+
 /// The matrix of shares, without its zeros.
 #[derive(Debug)]
 struct Mixing {
@@ -123,11 +126,21 @@ impl Mixing {
 
     /// What is added to each element, times a factor.
     fn added(&self, values: &[f64], factor: f64) -> Vec<f64> {
+        if factor == 0.0 || values.iter().all(|value| *value == 0.0) {
+            return vec![0.0; self.ends.len()];
+        }
         let mut start = 0;
         let of_element = |end: &usize| {
-            let parts = &self.parts[start..*end];
+            let parts = self.parts[start..*end].chunks_exact(LANES);
             start = *end;
-            factor * parts.iter().map(|(other, share)| share * values[*other]).sum::<f64>()
+            let rest: f64 = parts.remainder().iter().map(|(other, share)| share * values[*other]).sum();
+            let mut sums = [0.0; LANES];
+            for lanes in parts {
+                for (sum, (other, share)) in sums.iter_mut().zip(lanes) {
+                    *sum += share * values[*other];
+                }
+            }
+            factor * (sums.iter().sum::<f64>() + rest)
         };
         self.ends.iter().map(of_element).collect()
     }

@@ -473,6 +473,10 @@ impl OnMotion for Drafted {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.trace = Trace::default();
     }
@@ -516,6 +520,10 @@ impl OnCovering for Drafted {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.trace = Trace::default();
     }
@@ -528,6 +536,10 @@ impl OnElement for Drafted {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.trace = Trace::default();
     }
@@ -538,6 +550,10 @@ impl OnReadout for Drafted {
         if self.acts(now, now.contact, now.signal_mm, counts) {
             counts.iter_mut().zip(&self.values).for_each(|(counts, by)| *counts += by);
         }
+    }
+
+    fn remembers(&self) -> bool {
+        true
     }
 
     fn reset(&mut self) {

@@ -131,6 +131,10 @@ impl OnReadout for GainDrift {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.first_c = None;
     }

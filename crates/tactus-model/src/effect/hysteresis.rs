@@ -110,6 +110,10 @@ impl OnCovering for Hysteresis {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.plays.clear();
     }

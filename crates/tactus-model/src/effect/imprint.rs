@@ -94,6 +94,10 @@ impl OnCovering for Imprint {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.dents.clear();
     }
@@ -127,6 +131,10 @@ impl OnCovering for FreeImprint {
             }
             *u += rise_mm;
         }
+    }
+
+    fn remembers(&self) -> bool {
+        true
     }
 
     fn reset(&mut self) {

@@ -24,10 +24,10 @@ struct Lag {
 }
 
 impl Lags {
-    /// With time constants that are not negative, 0 following at once, and the weight of each.
+    /// With time constants that are not negative, 0 following at once, and the weight of each. What has no weight costs nothing.
     pub(super) fn new(of: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let lag = |(tau_s, weight)| Lag { tau_s, weight, output: Vec::new() };
-        Self { parts: of.into_iter().map(lag).collect(), before: Vec::new(), sum: Vec::new() }
+        let lag = |(tau_s, weight)| (weight != 0.0).then_some(Lag { tau_s, weight, output: Vec::new() });
+        Self { parts: of.into_iter().filter_map(lag).collect(), before: Vec::new(), sum: Vec::new() }
     }
 
     /// True once there is a past.
@@ -80,8 +80,8 @@ impl Lag {
             return [1.0, 0.0, 0.0];
         }
         let x = dt_s / self.tau_s;
-        let keeps = (-x).exp();
-        let mean = -(-x).exp_m1() / x;
+        let lost = -(-x).exp_m1();
+        let (keeps, mean) = (1.0 - lost, lost / x);
         [keeps, mean - keeps, 1.0 - mean]
     }
 }

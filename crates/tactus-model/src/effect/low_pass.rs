@@ -39,6 +39,10 @@ impl OnReadout for LowPass {
         counts.copy_from_slice(self.lag.output());
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.lag.reset();
     }

@@ -98,6 +98,10 @@ impl OnCovering for RateStiffening {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.past = None;
     }

@@ -109,6 +109,10 @@ impl OnCovering for Relaxation {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.relaxed.reset();
     }

@@ -80,6 +80,10 @@ impl OnReadout for ScanSkew {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.history.clear();
     }

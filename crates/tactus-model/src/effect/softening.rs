@@ -91,6 +91,10 @@ impl OnCovering for Softening {
         }
     }
 
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn reset(&mut self) {
         self.pasts.clear();
     }
