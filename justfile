@@ -220,6 +220,20 @@ bench-peers *arguments: bench-peers-tools
     RUSTFLAGS="-C target-cpu=native" cargo build --profile dist --package tactus-bench --target-dir target/native
     {{ tools }}/peers/bin/python bench/peers/forward.py --binary target/native/dist/tactus-bench {{ arguments }}
 
+# The way of a frame to another process, frames to disk, presses of a script: beside zenoh, pyserial with pyzmq, LSL, mcap, h5py, bluesky.
+bench-service *arguments: bench-service-tools
+    cargo build --profile dist --package tactus --package tactus-daemon --package tactus-bench
+    cargo build --profile dist --package tactus-record --example throughput
+    {{ tools }}/service/bin/python bench/peers/latency.py {{ arguments }}
+    {{ tools }}/service/bin/python bench/peers/recording.py {{ arguments }}
+    {{ tools }}/service/bin/python bench/peers/orchestration.py {{ arguments }}
+
+# A virtual environment with what others use for it.
+[private]
+bench-service-tools:
+    test -d {{ tools }}/service || python3 -m venv {{ tools }}/service
+    {{ tools }}/service/bin/pip install --quiet --requirement bench/peers/service-requirements.txt
+
 # Both panels of Fig. 6 beside a numpy program.
 bench-acuity *arguments: bench-peers-tools
     cargo build --profile dist --package tactus-bench

@@ -2,9 +2,10 @@
 //!
 //! The measurements of the forward model (`tactus-bench --help` and the criterion benchmark) use the same [`Tool`]s at the
 //! same [`Pose`]s on the same arrays, with each [`Method`] from pose to image. [`Fem`] is the finite element model of the
-//! covering. [`evidence`] measures something else: how well `tactus discover` finds and names hidden physics.
+//! covering. [`latency`] measures the way of a frame. [`evidence`] measures something else: how well `tactus discover` finds and names hidden physics.
 
 pub mod evidence;
+pub mod latency;
 
 mod acuity;
 mod calibration;

@@ -11,8 +11,9 @@ use evidence_command::EvidenceArgs;
 use serde_json::json;
 use tactus_bench::{
     Acuity, COVERING, Calibration, Fem, Forward, Growth, Kernel, MachineLimits, Method, Painter, Pose, Sweep,
-    Tool, model, poses,
+    Tool, latency, model, poses,
 };
+use tactus_bus::Endpoint;
 use tactus_calibrate::acuity::Grid;
 use tactus_model::Array;
 use tactus_solid::fem::Bricks;
@@ -100,6 +101,23 @@ enum Part {
     Growth,
     /// Share of this machine's arithmetic and bandwidth that the kernels use.
     Limits,
+    /// Prints a line when it is ready, hears so many frames of a service, and prints each one's number and when it was heard.
+    Hear {
+        /// The service, or the relay.
+        endpoint: Endpoint,
+        /// Number of frames.
+        frames: usize,
+        /// Hear what `relay` publishes, with zenoh alone.
+        #[arg(long)]
+        bare: bool,
+    },
+    /// Publishes the frames that come from a terminal with zenoh alone, until the terminal closes.
+    Relay {
+        /// The terminal.
+        device: PathBuf,
+        /// Where to listen.
+        endpoint: Endpoint,
+    },
     /// How well `tactus discover` finds and names hidden physics.
     Evidence(EvidenceArgs),
 }
@@ -119,9 +137,18 @@ fn main() -> Result<()> {
         }
         Part::Growth => growth(&Growth::measure()?),
         Part::Limits => limits(&MachineLimits::measure()?),
+        Part::Hear { endpoint, frames, bare } => {
+            let hear = if bare { latency::hear_bare } else { latency::hear };
+            println!("{}", serde_json::to_string(&hear(&endpoint, frames, ready)?)?);
+        }
+        Part::Relay { device, endpoint } => latency::relay(&device, &endpoint, ready)?,
         Part::Evidence(args) => args.run()?,
     }
     Ok(())
+}
+
+fn ready() {
+    println!("ready");
 }
 
 fn shipped(name: &str) -> Result<Array, String> {
