@@ -234,6 +234,11 @@ bench-service-tools:
     test -d {{ tools }}/service || python3 -m venv {{ tools }}/service
     {{ tools }}/service/bin/pip install --quiet --requirement bench/peers/service-requirements.txt
 
+# How many rigs one service carries: memory and processor time of each, then more and more until a frame is lost. docs/scale.md.
+bench-rigs *arguments="1,50,100 --record --search 3":
+    cargo build --profile dist --package tactus-daemon --package tactus-bench
+    target/dist/tactus-bench rigs {{ arguments }}
+
 # Both panels of Fig. 6 beside a numpy program.
 bench-acuity *arguments: bench-peers-tools
     cargo build --profile dist --package tactus-bench

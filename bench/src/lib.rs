@@ -2,7 +2,8 @@
 //!
 //! The measurements of the forward model (`tactus-bench --help` and the criterion benchmark) use the same [`Tool`]s at the
 //! same [`Pose`]s on the same arrays, with each [`Method`] from pose to image. [`Fem`] is the finite element model of the
-//! covering. [`latency`] measures the way of a frame. [`evidence`] measures something else: how well `tactus discover` finds and names hidden physics.
+//! covering. [`latency`] measures the way of a frame, and [`RigsTrial`] a service of many rigs. [`evidence`] measures something else: how
+//! well `tactus discover` finds and names hidden physics.
 
 pub mod evidence;
 pub mod latency;
@@ -17,6 +18,7 @@ mod limits;
 mod method;
 mod models;
 mod press;
+mod rigs;
 
 pub use acuity::Acuity;
 pub use calibration::{Calibration, Sweep};
@@ -28,3 +30,4 @@ pub use limits::{Kernel, MachineLimits};
 pub use method::{Method, Painter};
 pub use models::{even, model};
 pub use press::{COVERING, DEPTH_MAX_MM, Pose, Tool, fine_sphere, poses};
+pub use rigs::{RigsMeasured, RigsTrial};

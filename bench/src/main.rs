@@ -2,12 +2,14 @@
 #![expect(clippy::print_stdout, reason = "standard output is this program's interface")]
 
 mod evidence_command;
+mod rigs_command;
 
 use std::{path::PathBuf, time::Duration};
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use evidence_command::EvidenceArgs;
+use rigs_command::RigsArgs;
 use serde_json::json;
 use tactus_bench::{
     Acuity, COVERING, Calibration, Fem, Forward, Growth, Kernel, MachineLimits, Method, Painter, Pose, Sweep,
@@ -118,6 +120,8 @@ enum Part {
         /// Where to listen.
         endpoint: Endpoint,
     },
+    /// How many rigs one service carries: memory of a rig, processor time of a frame, frames lost.
+    Rigs(RigsArgs),
     /// How well `tactus discover` finds and names hidden physics.
     Evidence(EvidenceArgs),
 }
@@ -142,6 +146,7 @@ fn main() -> Result<()> {
             println!("{}", serde_json::to_string(&hear(&endpoint, frames, ready)?)?);
         }
         Part::Relay { device, endpoint } => latency::relay(&device, &endpoint, ready)?,
+        Part::Rigs(args) => args.run()?,
         Part::Evidence(args) => args.run()?,
     }
     Ok(())

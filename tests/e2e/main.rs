@@ -16,6 +16,7 @@ mod import;
 mod kill_trials;
 mod link;
 mod reports;
+mod rigs;
 mod runs;
 mod scripts;
 mod service;

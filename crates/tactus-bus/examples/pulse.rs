@@ -124,7 +124,7 @@ impl Pulse {
         });
     }
 
-    fn answer(&mut self, CommandCall { command, request, reply }: CommandCall) {
+    fn answer(&mut self, CommandCall { command, request, reply, .. }: CommandCall) {
         let refusal = match (command, request, &mut self.run) {
             (
                 Command::Status | Command::Experiments | Command::Plan | Command::Reset | Command::Lease,

@@ -11,10 +11,10 @@ use crate::{BusConfig, config::TlsConfig, topic::heard};
 /// Every key: `**` does not match zenoh-ext's keys, which have `@`.
 const EVERYTHING: [&str; 2] = ["**", "**/@adv/**"];
 
-/// The rules for a rig's service.
-pub(crate) fn rules(config: &BusConfig, keys: &Keys) -> Value {
+/// The rules for the service of these rigs.
+pub(crate) fn rules(config: &BusConfig, rigs: &[Keys]) -> Value {
     let guests: Vec<_> = config.guests.iter().map(Keys::new).collect();
-    let served = || [keys].into_iter().chain(&guests);
+    let served = || rigs.iter().chain(&guests);
     let asks: Vec<_> = served().flat_map(readable).chain([STOP_EVERY_RIG.to_owned()]).collect();
     let commands: Vec<_> = served().flat_map(commandable).collect();
     let mut rules = vec![

@@ -1,6 +1,11 @@
 //! The bus on a client's side.
 
-use std::{collections::BTreeMap, error::Error, io, time::Duration};
+use std::{
+    collections::{BTreeMap, VecDeque},
+    error::Error,
+    io,
+    time::Duration,
+};
 
 use tactus_schema::{
     Message,
@@ -29,6 +34,8 @@ use crate::{
 
 /// Time limit for a machine that does not answer.
 const REACH_TIMEOUT: Duration = Duration::from_secs(2);
+/// Rigs that are asked at the same time.
+const ASKED_AT_ONCE: usize = 64;
 /// Time that the other services on the bus have to answer a stop after the one at the endpoint did.
 const OTHERS_PATIENCE: Duration = Duration::from_secs(1);
 
@@ -50,7 +57,7 @@ pub(crate) struct Caller {
 
 impl Client {
     /// Connects to the service at an endpoint; fails at once if nothing listens there. Without a rig's name it connects to
-    /// the rig of the service that listens there or, if that is a router, to the only rig that is ready.
+    /// the only rig of the service that listens there or, if that is a router, to the only rig that is ready.
     ///
     /// # Errors
     /// [`BusError::NoService`], [`BusError::NotAllowed`], [`BusError::Session`]; [`BusError::RigName`] for an invalid name;
@@ -219,6 +226,52 @@ pub async fn rigs_at(endpoint: &Endpoint, credentials: &Credentials) -> Result<V
     Ok(rigs)
 }
 
+/// Sends one command to every rig of the service at an endpoint or, if that is a router, to every rig behind it. Each answer comes
+/// with its rig's name, sorted by it; `None` if the rig did not answer in time.
+///
+/// # Errors
+/// [`BusError::NoService`], [`BusError::NotAllowed`], [`BusError::Session`]; [`BusError::NoRig`] if there is none.
+///
+/// # Panics
+/// As [`Client::connect`].
+pub async fn ask_all<M: Message + Clone + 'static>(
+    endpoint: &Endpoint,
+    credentials: &Credentials,
+    command: Command,
+    request: &M,
+    patience: Duration,
+) -> Result<Vec<(String, Option<pb::CommandReply>)>, BusError> {
+    reach(endpoint).await?;
+    let session = open(endpoint, credentials).await?;
+    let roster = Roster::keep(&session).await?;
+    let neighbours: Vec<ZenohId> = session.info().peers_zid().await.collect();
+    let own = roster.rigs_of(&neighbours);
+    let rigs = if own.is_empty() { roster.served() } else { own };
+    if rigs.is_empty() {
+        return Err(BusError::NoRig { endpoint: endpoint.to_string() });
+    }
+    let mut asking = VecDeque::new();
+    let mut answers = Vec::new();
+    for rig in rigs {
+        let caller =
+            Caller { session: session.clone(), trust: roster.trust(&rig), keys: Keys::new(rig.clone()) };
+        let request = request.clone();
+        let asked = tokio::spawn(async move { caller.command(command, &request, patience).await.ok() });
+        asking.push_back((rig, asked));
+        // A service takes so many at once and refuses more.
+        if asking.len() == ASKED_AT_ONCE
+            && let Some((rig, asked)) = asking.pop_front()
+        {
+            answers.push((rig, asked.await.ok().flatten()));
+        }
+    }
+    for (rig, asked) in asking {
+        answers.push((rig, asked.await.ok().flatten()));
+    }
+    session.close().await.map_err(|source| BusError::Close { source: of_zenoh(&source) })?;
+    Ok(answers)
+}
+
 /// Stops the rig of that name, or every rig that the bus at an endpoint reaches: by datagram and on the bus at once, without
 /// a lease, and without waiting until a service says that it is ready. Returns the answer of each service.
 ///
@@ -305,9 +358,14 @@ async fn stop_on_bus(
         && let Ok(Ok(reply)) = timeout_at(until, replies.recv_async()).await
     {
         let (Ok(sample), Some(replier)) = (reply.result(), reply.replier_id()) else { continue };
-        if let Some(known) = awaited.iter().position(|(_, id)| *id == replier.zid()) {
+        let reply = decode(&key, sample)?;
+        // A service of one rig may leave its name out.
+        let is_by = |(rig, id): &(String, ZenohId)| {
+            *id == replier.zid() && (reply.rig.is_empty() || *rig == reply.rig)
+        };
+        if let Some(known) = awaited.iter().position(is_by) {
             let (rig, _) = awaited.remove(known);
-            answers.push(pb::CommandReply { rig, ..decode(&key, sample)? });
+            answers.push(pb::CommandReply { rig, ..reply });
         }
     }
     // Another service may only say that it is the rig's: it counts if all have answered.
@@ -394,11 +452,15 @@ fn the_named_rig(rig: &str, roster: &Roster, endpoint: &Endpoint) -> Result<Stri
     Err(BusError::UnknownRig { endpoint: endpoint.to_string(), rig: rig.to_owned(), rigs })
 }
 
-/// The rig of the service at the other end of the connection or, if that is a router, the only one that is ready.
+/// The only rig of the service at the other end of the connection or, if that is a router, the only one that is ready. A service of
+/// several rigs wants a name, whichever of them are ready: another rig must not take the place of one that is missing.
 fn the_rig_of(neighbours: &[ZenohId], roster: &Roster, endpoint: &Endpoint) -> Result<String, BusError> {
     let mut own = roster.rigs_of(neighbours);
-    match (own.pop(), own.is_empty()) {
-        (Some(rig), true) => Ok(rig),
+    if own.len() > 1 {
+        return Err(BusError::SeveralRigs { endpoint: endpoint.to_string(), rigs: own });
+    }
+    match own.pop() {
+        Some(rig) if roster.is_ready(&rig) => Ok(rig),
         _ => the_only_rig(roster.rigs(), endpoint),
     }
 }

@@ -48,6 +48,8 @@ pub struct Calls {
 /// A received command, which must be answered.
 #[derive(Debug)]
 pub struct CommandCall {
+    /// Name of the rig; `None` for a stop of every rig.
+    pub rig: Option<Arc<str>>,
     /// Which command.
     pub command: Command,
     /// Its arguments.
@@ -79,19 +81,19 @@ enum ReplyTo {
     Datagram(StopSender),
 }
 
-/// A reply waiting to be sent. One thread sends all replies: a stalled client can delay another client's reply, once,
-/// but not the execution of its command.
+/// Replies to one query, waiting to be sent. One thread sends all replies: a stalled client can delay another client's
+/// reply, once, but not the execution of its command.
 #[derive(Debug)]
-pub(crate) struct PendingReply {
+pub(crate) struct PendingReplies {
     query: Query,
     key: Arc<str>,
-    reply: pb::CommandReply,
+    replies: Vec<pb::CommandReply>,
 }
 
 /// Sends replies through the queue.
 #[derive(Debug, Clone)]
 pub(crate) struct Replies {
-    answers: Arc<Queue<PendingReply>>,
+    answers: Arc<Queue<PendingReplies>>,
     runtime: Handle,
 }
 
@@ -114,21 +116,35 @@ impl Responder {
 
     /// Sends the reply. Never waits.
     pub fn reply(self, reply: pb::CommandReply) {
+        self.reply_for_all(vec![reply]);
+    }
+
+    /// Sends the replies of all rigs that the command was for. Never waits. A datagram is answered with the first, which
+    /// names the others in its note.
+    pub fn reply_for_all(self, mut of_rigs: Vec<pb::CommandReply>) {
         match self.to {
-            ReplyTo::Bus { query, key, replies } => replies.send(query, key, reply),
-            ReplyTo::Datagram(sender) => sender.answer(&reply),
+            ReplyTo::Bus { query, key, replies } => replies.send(query, key, of_rigs),
+            ReplyTo::Datagram(sender) => {
+                let others: Vec<_> = of_rigs.iter().skip(1).map(|reply| reply.rig.clone()).collect();
+                if let Some(first) = of_rigs.first_mut() {
+                    if !others.is_empty() {
+                        first.note = format!("the others of this service too: {}", others.join(", "));
+                    }
+                    sender.answer(first);
+                }
+            }
         }
     }
 }
 
 impl Replies {
     /// Sends replies through this queue.
-    pub(crate) fn to(answers: Arc<Queue<PendingReply>>) -> Self {
+    pub(crate) fn to(answers: Arc<Queue<PendingReplies>>) -> Self {
         Self { answers, runtime: Handle::current() }
     }
 
-    fn send(&self, query: Query, key: Arc<str>, reply: pb::CommandReply) {
-        if let Some(displaced) = self.answers.push(PendingReply { query, key, reply }) {
+    fn send(&self, query: Query, key: Arc<str>, replies: Vec<pb::CommandReply>) {
+        if let Some(displaced) = self.answers.push(PendingReplies { query, key, replies }) {
             tracing::warn!(
                 key = %displaced.key,
                 "a reply is not sent: too many are waiting, or the bus is closed"
@@ -138,20 +154,23 @@ impl Replies {
     }
 }
 
-/// The queue of replies.
-pub(crate) fn answers() -> Arc<Queue<PendingReply>> {
+/// The queue of replies of a service of so many rigs.
+pub(crate) fn answers(rigs: usize) -> Arc<Queue<PendingReplies>> {
     // Drop-oldest: a client that sends this many commands at once loses the first replies.
-    Arc::new(Queue::new(WAITING_ANSWERS))
+    Arc::new(Queue::new(WAITING_ANSWERS + rigs))
 }
 
-impl PendingReply {
-    /// Sends the reply; may wait for the client.
+impl PendingReplies {
+    /// Sends the replies; may wait for the client.
     pub(crate) fn send(self) {
-        let Self { query, key, reply } = self;
-        let sent =
-            query.reply(&*key, reply.encode_to_vec()).encoding(encoding(pb::CommandReply::NAME)).wait();
-        if let Err(error) = sent {
-            tracing::warn!(%key, %error, "the reply did not reach its client");
+        let Self { query, key, replies } = self;
+        for reply in replies {
+            let sent =
+                query.reply(&*key, reply.encode_to_vec()).encoding(encoding(pb::CommandReply::NAME)).wait();
+            if let Err(error) = sent {
+                tracing::warn!(%key, %error, "the reply did not reach its client");
+                return;
+            }
         }
     }
 }
@@ -161,61 +180,89 @@ pub(crate) fn drop_on_blocking_thread(query: Query, runtime: &Handle) {
     runtime.spawn_blocking(move || drop(query));
 }
 
-/// The two channels of [`Calls`], on the side that receives from the bus.
+/// Where a rig's calls go.
 #[derive(Debug, Clone)]
 pub(crate) struct Intake {
-    pub(crate) stops: mpsc::Sender<CommandCall>,
+    stops: mpsc::Sender<CommandCall>,
     commands: mpsc::Sender<CommandCall>,
 }
 
-/// The channels.
-pub(crate) fn channels() -> (Intake, Calls) {
-    // Both bounded; a call that does not fit is refused at once.
-    let (stop, stops) = mpsc::channel(WAITING_COMMANDS);
-    let (other, commands) = mpsc::channel(WAITING_COMMANDS);
-    (Intake { stops: stop, commands: other }, Calls { stops, commands })
+impl Intake {
+    /// A rig's own channel of commands, beside the channel of all rigs' stops.
+    pub(crate) fn open(stops: mpsc::Sender<CommandCall>) -> (Self, mpsc::Receiver<CommandCall>) {
+        // Bounded; a call that does not fit is refused at once.
+        let (commands, calls) = mpsc::channel(WAITING_COMMANDS);
+        (Self { stops, commands }, calls)
+    }
 }
 
-/// Declares the rig's commands.
+/// Declares the rig's commands: as one key, because each key costs every client a message and the service memory.
 pub(crate) async fn declare(
     session: &Session,
     keys: &Keys,
-    intake: &Intake,
+    intake: Intake,
     replies: &Replies,
-) -> Result<Vec<Queryable<()>>, BusError> {
-    let of_rig = Command::ALL.map(|command| (command, keys.command(command)));
-    let mut queryables = Vec::new();
-    for (command, key) in of_rig.into_iter().chain([(Command::Stop, STOP_EVERY_RIG.to_owned())]) {
-        let calls = if command == Command::Stop { &intake.stops } else { &intake.commands }.clone();
-        let replies = replies.clone();
-        let rig = keys.rig().to_owned();
-        let exact: Arc<str> = key.as_str().into();
-        let queryable = session
-            .declare_queryable(&key)
-            .callback(move |query| {
-                // A question to many keys is a read: a wildcard must not command.
-                if query.key_expr().as_str() != &*exact {
-                    tracing::debug!(asked = %query.key_expr(), key = %exact, "a wildcard commands nothing");
-                    drop_on_blocking_thread(query, &replies.runtime);
-                    return;
-                }
-                if let Err(refusal) = take_in(command, query, &exact, &calls, &replies) {
-                    let (query, reply) = *refusal;
-                    replies.send(query, exact.clone(), pb::CommandReply { rig: rig.clone(), ..reply });
-                }
-            })
-            .await
-            .map_err(BusError::key(&key))?;
-        queryables.push(queryable);
+) -> Result<Queryable<()>, BusError> {
+    let key = keys.commands();
+    let rig: Arc<str> = keys.rig().into();
+    let (keys, replies) = (keys.clone(), replies.clone());
+    let taking = move |query: Query| {
+        // A question to many keys is a read: a wildcard must not command.
+        let Some(command) = keys.command_at(query.key_expr()) else {
+            return ignore(query, &replies);
+        };
+        let calls = if command == Command::Stop { &intake.stops } else { &intake.commands };
+        let key = query.key_expr().as_str().into();
+        take_in(Some(&rig), command, query, &key, calls, &replies);
+    };
+    session.declare_queryable(&key).callback(taking).await.map_err(BusError::key(&key))
+}
+
+/// Declares the stop of every rig.
+pub(crate) async fn declare_stop(
+    session: &Session,
+    stops: &mpsc::Sender<CommandCall>,
+    replies: &Replies,
+) -> Result<Queryable<()>, BusError> {
+    let key: Arc<str> = STOP_EVERY_RIG.into();
+    let (stops, replies) = (stops.clone(), replies.clone());
+    let taking = move |query: Query| {
+        if query.key_expr().as_str() == &*key {
+            take_in(None, Command::Stop, query, &key, &stops, &replies);
+        } else {
+            ignore(query, &replies);
+        }
+    };
+    session.declare_queryable(STOP_EVERY_RIG).callback(taking).await.map_err(BusError::key(STOP_EVERY_RIG))
+}
+
+fn ignore(query: Query, replies: &Replies) {
+    tracing::debug!(asked = %query.key_expr(), "a wildcard commands nothing");
+    drop_on_blocking_thread(query, &replies.runtime);
+}
+
+/// Passes a query on to the service, or refuses it.
+fn take_in(
+    rig: Option<&Arc<str>>,
+    command: Command,
+    query: Query,
+    key: &Arc<str>,
+    calls: &mpsc::Sender<CommandCall>,
+    replies: &Replies,
+) {
+    if let Err(refusal) = pass_on(rig, command, query, key, calls, replies) {
+        let (query, reply) = *refusal;
+        let rig = rig.map(ToString::to_string).unwrap_or_default();
+        replies.send(query, key.clone(), vec![pb::CommandReply { rig, ..reply }]);
     }
-    Ok(queryables)
 }
 
 /// Passes a query on to the service.
 ///
 /// # Errors
 /// The refusal, with its query.
-fn take_in(
+fn pass_on(
+    rig: Option<&Arc<str>>,
     command: Command,
     mut query: Query,
     key: &Arc<str>,
@@ -229,10 +276,10 @@ fn take_in(
         Err(error) => return Err(Box::new((query, refusal(EXIT_USAGE, error)))),
     };
     let to = ReplyTo::Bus { query, key: key.clone(), replies: replies.clone() };
-    let call = CommandCall { command, request, reply: Responder { to } };
+    let call = CommandCall { rig: rig.cloned(), command, request, reply: Responder { to } };
     calls.try_send(call).or_else(|refused| {
         let (call, error) = match refused {
-            TrySendError::Full(call) => (call, format!("{WAITING_COMMANDS} commands are waiting; try again")),
+            TrySendError::Full(call) => (call, "too many commands are waiting; try again".to_owned()),
             TrySendError::Closed(call) => (call, "the service is shutting down".to_owned()),
         };
         match call.reply.to {

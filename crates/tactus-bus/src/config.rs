@@ -106,14 +106,14 @@ impl BusConfig {
         Ok(())
     }
 
-    /// Zenoh's settings for the service of a rig.
-    pub(crate) fn service(&self, keys: &Keys) -> Result<Config, BusError> {
+    /// Zenoh's settings for the service of these rigs.
+    pub(crate) fn service(&self, rigs: &[Keys]) -> Result<Config, BusError> {
         let listen = texts(&self.listen);
         let mut settings = vec![
             ("mode", json!("peer")),
             ("listen/endpoints", json!(listen)),
             ("connect/endpoints", json!(texts(&self.connect))),
-            ("access_control", access::rules(self, keys)),
+            ("access_control", access::rules(self, rigs)),
             ("transport/unicast/max_sessions", json!(SESSIONS_MAX)),
             ("transport/unicast/accept_pending", json!(PENDING_MAX)),
             ("transport/unicast/accept_timeout", json!(PENDING_MS)),

@@ -45,8 +45,11 @@ pub enum BusError {
     /// No rig is ready at the endpoint.
     #[error("a bus listens at {endpoint}, but no rig is ready on it; its service may still be starting")]
     NoRig { endpoint: String },
-    /// Several rigs are ready and none was named.
-    #[error("several rigs are ready at {endpoint}: {}; name one", .rigs.join(", "))]
+    /// The node serves a rig of that name.
+    #[error("rig {rig:?} is already served here: give each rig a name of its own")]
+    Served { rig: String },
+    /// Several rigs are there and none was named.
+    #[error("several rigs are served at {endpoint}: {}; name one with --rig NAME", .rigs.join(", "))]
     SeveralRigs { endpoint: String, rigs: Vec<String> },
     /// The rig that was named is not served.
     #[error("no rig {rig:?} at {endpoint}; there is: {}", .rigs.join(", "))]

@@ -1,12 +1,12 @@
 //! The bus between the service and its clients, based on zenoh: published messages, commands and liveliness.
 //!
-//! The service opens a [`Bus`] and hands out [`Publisher`]s, whose calls never wait; it receives commands as [`Calls`]. A
-//! client uses [`Client::connect`], [`Client::command`] and [`Client::subscribe`]. Keys, messages and encoding are those
+//! The service opens a [`Node`], puts each of its rigs on it as a [`Bus`], and hands out [`Publisher`]s, whose calls never
+//! wait; it receives commands as [`CommandCall`]s. A client uses [`Client::connect`], [`Client::command`] and [`Client::subscribe`]. Keys, messages and encoding are those
 //! of `tactus-schema`, so any zenoh client in any language can take part.
 //!
 //! | topic | kept for late joiners |
 //! |---|---|
-//! | `sensor/frame` | the last 300 (10 s) |
+//! | `sensor/frame` | the last 300 (10 s); with more than 256 rigs fewer, 76,800 of all |
 //! | `run/event` | the last 16,384 |
 //! | all others | the last one |
 //!
@@ -38,6 +38,8 @@ mod error;
 mod lease;
 mod liveness;
 mod merge;
+mod node;
+mod outlet;
 mod publisher;
 mod queue;
 mod service;
@@ -46,13 +48,14 @@ mod subscription;
 mod topic;
 mod worker;
 
-pub use client::{Client, rigs_at, stop};
+pub use client::{Client, ask_all, rigs_at, stop};
 pub use command::{Calls, CommandCall, Request, Responder};
 pub use config::{BusConfig, Credentials, TlsConfig};
 pub use endpoint::Endpoint;
 pub use error::BusError;
 pub use lease::{HeldLease, Hold};
 pub use liveness::{Alive, AliveToken};
+pub use node::Node;
 pub use publisher::Publisher;
 pub use service::Bus;
 pub use subscription::{History, Losses, Subscription};

@@ -1,10 +1,10 @@
 //! Liveliness: the service's tokens, and the clients' view of them.
 //!
-//! A service holds two tokens. `tactus/<rig>/service/<instance>` says from its start which session on the bus is the
-//! rig's: clients believe the answers and messages of that session only. `tactus/<rig>/alive` says that it is ready.
+//! A service holds two tokens of each rig. `tactus/<rig>/service/<instance>` says from its start which session on the bus is
+//! the rig's: clients believe the answers and messages of that session only. `tactus/<rig>/alive` says that it is ready.
 
 use std::{
-    collections::{BTreeSet, VecDeque},
+    collections::{BTreeMap, BTreeSet, VecDeque},
     time::Duration,
 };
 
@@ -25,8 +25,10 @@ const ROLL_CALL_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Instances of one rig that are remembered, so that their last messages are still believed after they have ended.
 const REMEMBERED: usize = 16;
-/// Services that a client keeps in mind; announcements of further ones are ignored.
-const SERVICES_MAX: usize = 1_024;
+/// Rigs that a client keeps in mind; announcements of further ones are ignored.
+const SERVICES_MAX: usize = 16_384;
+/// Running instances of one rig that a client keeps in mind.
+const INSTANCES_MAX: usize = 64;
 
 /// Shows clients that the service is ready. They see it disappear when it is dropped or the process dies.
 #[derive(Debug)]
@@ -69,11 +71,11 @@ pub(crate) struct Trust {
 pub(crate) struct Known {
     /// Rigs that are ready.
     ready: BTreeSet<String>,
-    /// Running instances in the order of their announcements.
-    running: Vec<(String, ZenohId)>,
+    /// Running instances of each rig in the order of their announcements.
+    running: BTreeMap<String, Vec<ZenohId>>,
     /// Instances that speak for their rig, the newest last. An instance that is announced while another one speaks for
     /// the same rig does not, until that one has ended.
-    believed: VecDeque<(String, ZenohId)>,
+    believed: BTreeMap<String, VecDeque<ZenohId>>,
 }
 
 /// What an announcement is about.
@@ -135,7 +137,7 @@ impl Trust {
 impl Known {
     /// False for a session that is not believed while another one is; `None` without any.
     fn believes(&self, rig: &str, session: &ZenohId) -> Option<bool> {
-        if self.believed.iter().any(|(of, id)| of == rig && id == session) {
+        if self.believed.get(rig).is_some_and(|believed| believed.contains(session)) {
             return Some(true);
         }
         self.speaks(rig).map(|_| false)
@@ -143,8 +145,8 @@ impl Known {
 
     /// The running instance that is believed.
     fn speaks(&self, rig: &str) -> Option<ZenohId> {
-        let runs = |of: &str, id: &ZenohId| self.running.iter().any(|(other, run)| other == of && run == id);
-        self.believed.iter().rev().find(|(of, id)| of == rig && runs(of, id)).map(|(_, id)| *id)
+        let running = self.running.get(rig)?;
+        self.believed.get(rig)?.iter().rev().find(|id| running.contains(id)).copied()
     }
 
     fn on_token(&mut self, announced: &Announced<'_>, kind: SampleKind) {
@@ -158,14 +160,22 @@ impl Known {
                 self.ready.remove(*rig);
             }
             (Announced::Instance(rig, id), SampleKind::Put) => {
-                let one = ((*rig).to_owned(), *id);
-                if self.running.len() < SERVICES_MAX && !self.running.contains(&one) {
-                    self.running.push(one);
+                if self.running.len() >= SERVICES_MAX && !self.running.contains_key(*rig) {
+                    return;
+                }
+                let running = self.running.entry((*rig).to_owned()).or_default();
+                if running.len() < INSTANCES_MAX && !running.contains(id) {
+                    running.push(*id);
                     self.believe_the_first(rig);
                 }
             }
             (Announced::Instance(rig, id), SampleKind::Delete) => {
-                self.running.retain(|(of, run)| (of, run) != (&(*rig).to_owned(), id));
+                if let Some(running) = self.running.get_mut(*rig) {
+                    running.retain(|run| run != id);
+                    if running.is_empty() {
+                        self.running.remove(*rig);
+                    }
+                }
                 self.believe_the_first(rig);
             }
         }
@@ -174,23 +184,22 @@ impl Known {
     /// Believes the longest running instance of a rig that nobody speaks for.
     fn believe_the_first(&mut self, rig: &str) {
         if self.speaks(rig).is_none()
-            && let Some(first) = self.running.iter().find(|(of, _)| of == rig)
+            && let Some(first) = self.running.get(rig).and_then(|running| running.first())
         {
-            self.believed.push_back(first.clone());
-            if self.believed.iter().filter(|(of, _)| of == rig).count() > REMEMBERED
-                && let Some(oldest) = self.believed.iter().position(|(of, _)| of == rig)
-            {
-                self.believed.remove(oldest);
+            let believed = self.believed.entry(rig.to_owned()).or_default();
+            believed.push_back(*first);
+            if believed.len() > REMEMBERED {
+                believed.pop_front();
             }
         }
     }
 
     /// Believes an instance although another one was announced first: the client is connected to it.
     fn prefer(&mut self, neighbours: &[ZenohId]) {
-        let own = self.running.iter().filter(|(_, id)| neighbours.contains(id)).cloned().collect::<Vec<_>>();
-        for (rig, id) in own {
-            self.believed.retain(|(of, _)| *of != rig);
-            self.believed.push_back((rig, id));
+        for (rig, running) in &self.running {
+            for id in running.iter().filter(|id| neighbours.contains(id)) {
+                self.believed.insert(rig.clone(), VecDeque::from([*id]));
+            }
         }
     }
 }
@@ -238,27 +247,36 @@ impl Roster {
 
     /// Names of the rigs whose services run now, ready or not, sorted.
     pub(crate) fn served(&self) -> Vec<String> {
-        let rigs: BTreeSet<String> = self.known.borrow().running.iter().map(|(rig, _)| rig.clone()).collect();
-        rigs.into_iter().collect()
+        self.known.borrow().running.keys().cloned().collect()
     }
 
-    /// Names of the ready rigs whose service is one of these sessions, sorted.
+    /// Names of the rigs, ready or not, whose service is one of these sessions, sorted.
     pub(crate) fn rigs_of(&self, sessions: &[ZenohId]) -> Vec<String> {
         let known = self.known.borrow();
         let of = |rig: &&String| known.speaks(rig).is_some_and(|id| sessions.contains(&id));
-        known.ready.iter().filter(of).cloned().collect()
+        known.running.keys().filter(of).cloned().collect()
+    }
+
+    /// True if the rig is ready.
+    pub(crate) fn is_ready(&self, rig: &str) -> bool {
+        self.known.borrow().ready.contains(rig)
     }
 
     /// The instances that run, with their rigs.
     pub(crate) fn running(&self) -> Vec<(String, ZenohId)> {
-        self.known.borrow().running.clone()
+        let known = self.known.borrow();
+        let of_rig = |(rig, ids): (&String, &Vec<ZenohId>)| {
+            let rig = rig.clone();
+            ids.clone().into_iter().map(move |id| (rig.clone(), id))
+        };
+        known.running.iter().flat_map(of_rig).collect()
     }
 
     /// True if more than one instance says that it is the rig's, and none of them is at the other end of the connection.
     pub(crate) fn is_ambiguous(&self, rig: &str, neighbours: &[ZenohId]) -> bool {
         let known = self.known.borrow();
-        let mut of_rig = known.running.iter().filter(|(of, _)| of == rig);
-        of_rig.clone().count() > 1 && !of_rig.any(|(_, id)| neighbours.contains(id))
+        let running = known.running.get(rig).map(Vec::as_slice).unwrap_or_default();
+        running.len() > 1 && !running.iter().any(|id| neighbours.contains(id))
     }
 
     /// Follows one rig.

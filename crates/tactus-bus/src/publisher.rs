@@ -1,4 +1,4 @@
-//! Publishing: calls that never wait, and queues that pass their messages to zenoh.
+//! Publishing: calls that never wait, and the publishers of a rig's topics.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -17,6 +17,7 @@ use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, MissDetectionCon
 use crate::{
     BusError, Published,
     cache::{Cache, HistoryQuery, Source},
+    outlet::Outlets,
     queue::Queue,
     topic::{Lane, Policy, encoding, message_name},
 };
@@ -25,32 +26,22 @@ use crate::{
 /// a burst.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
-/// Bytes that wait in each outgoing queue at most.
-const WAITING_BYTES_MAX: usize = 16 << 20;
-
 /// Publishes for the service. Cheap to clone; no call ever waits.
 #[derive(Debug, Clone)]
 pub struct Publisher {
-    lanes: Arc<Lanes>,
-}
-
-/// The outgoing queues.
-#[derive(Debug)]
-pub(crate) struct Lanes {
-    frames: Arc<Queue<Outgoing>>,
-    updates: Arc<Queue<Outgoing>>,
+    outlets: Arc<Outlets>,
 }
 
 /// One encoded message.
 #[derive(Debug)]
 pub(crate) struct Outgoing {
     topic: Topic,
-    payload: Vec<u8>,
+    pub(crate) payload: Vec<u8>,
 }
 
 impl Publisher {
-    pub(crate) fn new(lanes: Arc<Lanes>) -> Self {
-        Self { lanes }
+    pub(crate) fn new(outlets: Arc<Outlets>) -> Self {
+        Self { outlets }
     }
 
     /// Publishes a frame on `sensor/frame`.
@@ -62,9 +53,9 @@ impl Publisher {
     /// counted and logged; after [`crate::Bus::close`] nothing is published any more.
     pub fn publish<M: Published>(&self, message: &M) {
         let lane = Policy::of(M::TOPIC).lane;
-        let queue = self.lanes.queue(lane);
-        if queue.push(Outgoing { topic: M::TOPIC, payload: message.encode_to_vec() }).is_some() {
-            let dropped = queue.dropped();
+        let outlet = self.outlets.of(lane);
+        if outlet.push(Outgoing { topic: M::TOPIC, payload: message.encode_to_vec() }).is_some() {
+            let dropped = outlet.dropped();
             // One line each time the count doubles, to limit the log.
             if dropped.is_power_of_two() {
                 tracing::warn!(?lane, dropped, "the bus cannot keep up; the oldest messages are dropped");
@@ -75,34 +66,12 @@ impl Publisher {
     /// Frames dropped by the service because the bus could not keep up. Messages that the network drops for one slow client
     /// are counted by that client: see [`crate::Losses`].
     pub fn dropped_frames(&self) -> u64 {
-        self.lanes.frames.dropped()
+        self.outlets.frames.dropped()
     }
 
     /// Events and states dropped by the service because the bus could not keep up.
     pub fn dropped_updates(&self) -> u64 {
-        self.lanes.updates.dropped()
-    }
-}
-
-impl Lanes {
-    pub(crate) fn new() -> Self {
-        Self {
-            // Drop-oldest, counted: 10 s of frames.
-            frames: Arc::new(Queue::bounded(300, WAITING_BYTES_MAX, |message: &Outgoing| {
-                message.payload.len()
-            })),
-            // Drop-oldest, counted: far more than a run sends while stalled clients cost a millisecond per message each.
-            updates: Arc::new(Queue::bounded(8_192, WAITING_BYTES_MAX, |message: &Outgoing| {
-                message.payload.len()
-            })),
-        }
-    }
-
-    pub(crate) fn queue(&self, lane: Lane) -> &Arc<Queue<Outgoing>> {
-        match lane {
-            Lane::Frames => &self.frames,
-            Lane::Updates => &self.updates,
-        }
+        self.outlets.updates.dropped()
     }
 }
 
@@ -118,18 +87,20 @@ struct TopicPublisher {
 }
 
 impl TopicPublishers {
-    /// Declares the publishers of the lane's topics.
+    /// Declares the publishers of the lane's topics; `frames_kept` is the longest history.
     pub(crate) async fn declare(
         session: &Session,
         keys: &Keys,
         lane: Lane,
+        frames_kept: usize,
         history_queries: &Arc<Queue<HistoryQuery>>,
     ) -> Result<Self, BusError> {
         let mut publishers = BTreeMap::new();
         for topic in Topic::ALL {
             if Policy::of(topic).lane == lane {
-                publishers
-                    .insert(topic, TopicPublisher::declare(session, keys, topic, history_queries).await?);
+                let declared =
+                    TopicPublisher::declare(session, keys, topic, frames_kept, history_queries).await?;
+                publishers.insert(topic, declared);
             }
         }
         Ok(Self(publishers))
@@ -148,6 +119,7 @@ impl TopicPublisher {
         session: &Session,
         keys: &Keys,
         topic: Topic,
+        frames_kept: usize,
         history_queries: &Arc<Queue<HistoryQuery>>,
     ) -> Result<Self, BusError> {
         let policy = Policy::of(topic);
@@ -165,7 +137,8 @@ impl TopicPublisher {
             .await
             .map_err(BusError::key(&key))?;
         let source = Source { key, publisher: publisher.id(), encoding };
-        let cache = Cache::declare(session, source, policy.history, history_queries.clone()).await?;
+        let history = if topic == Topic::SensorFrame { frames_kept } else { policy.history };
+        let cache = Cache::declare(session, source, history, history_queries.clone()).await?;
         Ok(Self { publisher, cache })
     }
 

@@ -88,6 +88,17 @@ impl<T> Queue<T> {
         }
     }
 
+    /// Takes the oldest item, if there is one.
+    pub(crate) fn try_pop(&self) -> Option<T> {
+        self.take_oldest(&mut self.lock())
+    }
+
+    /// True once the queue is closed and empty.
+    pub(crate) fn is_finished(&self) -> bool {
+        let inside = self.lock();
+        inside.closed && inside.items.is_empty()
+    }
+
     /// Refuses further items; the items inside can still be read.
     pub(crate) fn close(&self) {
         self.lock().closed = true;

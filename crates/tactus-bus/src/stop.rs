@@ -4,7 +4,7 @@
 //! neither. A service that listens on `tcp/HOST:PORT` on loopback takes datagrams at the same port, and one that listens
 //! on a Unix socket takes them at `<socket>.stop` beside it. Whoever reaches it can stop, and nothing else.
 //!
-//! A datagram is `tactus stop RIG`, a line feed, and a [`pb::CommandRequest`]; an empty `RIG` means any. The answer is a
+//! A datagram is `tactus stop RIG`, a line feed, and a [`pb::CommandRequest`]; an empty `RIG` means every rig. The answer is a
 //! [`pb::CommandReply`].
 
 use std::{
@@ -31,7 +31,7 @@ use prost::Message as _;
 use tactus_schema::{key::Command, pb};
 use tokio::sync::mpsc;
 
-use crate::{CommandCall, Endpoint, Request, Responder, command::unreadable_stop};
+use crate::{CommandCall, Endpoint, Request, Responder, command::unreadable_stop, node::Served};
 
 /// Start of each datagram.
 const START: &[u8] = b"tactus stop";
@@ -74,13 +74,13 @@ enum Sender {
 }
 
 impl StopSocket {
-    /// Takes stops for a rig at an endpoint; `None` if the endpoint has no place for datagrams.
+    /// Takes stops for the served rigs at an endpoint; `None` if the endpoint has no place for datagrams.
     ///
     /// # Errors
     /// If another program has the place, or there is no thread.
     pub(crate) fn open(
         endpoint: &Endpoint,
-        rig: &str,
+        served: Served,
         stops: mpsc::Sender<CommandCall>,
     ) -> io::Result<Option<Self>> {
         let (socket, path) = if let Some(path) = place(endpoint) {
@@ -94,12 +94,12 @@ impl StopSocket {
         let socket = Arc::new(socket);
         let closed = Arc::new(AtomicBool::new(false));
         let taking = thread::Builder::new().name("bus-stop".to_owned()).spawn({
-            let (socket, closed, rig) = (socket.clone(), closed.clone(), rig.to_owned());
+            let (socket, closed) = (socket.clone(), closed.clone());
             move || {
                 while !closed.load(Ordering::Acquire) {
-                    if let Some((request, from)) = receive(&socket, &rig) {
+                    if let Some((rig, request, from)) = receive(&socket, &served) {
                         let reply = Responder::to_datagram(StopSender { socket: socket.clone(), from });
-                        let call = CommandCall { command: Command::Stop, request, reply };
+                        let call = CommandCall { rig, command: Command::Stop, request, reply };
                         // Full: so many stops wait already that this one would change nothing.
                         if stops.try_send(call).is_err() {
                             tracing::debug!("a stop finds many others waiting");
@@ -167,13 +167,17 @@ impl Socket {
     }
 }
 
-/// Waits for one datagram; `None` if it is not a stop for this rig.
-fn receive(socket: &Socket, rig: &str) -> Option<(Request, Sender)> {
+/// Waits for one datagram; `None` if it is not a stop for one of the rigs. Without a name it is for all of them.
+fn receive(socket: &Socket, served: &Served) -> Option<(Option<Arc<str>>, Request, Sender)> {
     let mut bytes = [0; BYTES_MAX];
     match socket.receive(&mut bytes) {
         Ok((len, from)) => {
             let (asked, request) = parse(bytes.get(..len).unwrap_or_default())?;
-            (asked.is_empty() || asked == rig.as_bytes()).then_some((Request::Control(request), from))
+            let rig = match std::str::from_utf8(asked).ok()? {
+                "" => None,
+                asked => Some(served.get(asked)?),
+            };
+            Some((rig, Request::Control(request), from))
         }
         // A client that left before its answer shows up here as an error of the next call.
         Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => None,

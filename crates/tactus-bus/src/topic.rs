@@ -56,10 +56,22 @@ pub(crate) enum Lane {
     Updates,
 }
 
+/// Frames kept of each rig.
+const FRAMES_KEPT_MAX: usize = 300;
+/// Frames kept of all rigs of a service together: some 27 MB.
+const FRAMES_KEPT_TOGETHER: usize = 76_800;
+
+/// Frames that are kept of each rig, if a service has so many: with more than 256 of them, fewer than else.
+pub(crate) fn frames_kept(rigs: usize) -> usize {
+    (FRAMES_KEPT_TOGETHER / rigs.max(1)).clamp(1, FRAMES_KEPT_MAX)
+}
+
 impl Policy {
     pub(crate) const fn of(topic: Topic) -> Self {
         match topic {
-            Topic::SensorFrame => Self { lane: Lane::Frames, history: 300, priority: Priority::DataHigh },
+            Topic::SensorFrame => {
+                Self { lane: Lane::Frames, history: FRAMES_KEPT_MAX, priority: Priority::DataHigh }
+            }
             Topic::RunEvent => Self::update(16_384),
             Topic::SensorInfo | Topic::StageState | Topic::RunState | Topic::Health | Topic::SafetyState => {
                 Self::update(1)

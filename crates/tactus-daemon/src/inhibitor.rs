@@ -3,9 +3,11 @@
 use std::io;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
 
 use tactus_engine::Engine;
 use tactus_schema::pb::RunPhase;
+use tokio::sync::watch;
 use tokio::task::spawn_blocking;
 use tracing::{info, warn};
 
@@ -14,16 +16,46 @@ const PROGRAM: &str = "systemd-inhibit";
 const ARGUMENTS: [&str; 5] =
     ["--what=sleep", "--mode=block", "--who=tactusd", "--why=a run is in progress", "cat"];
 
+/// Counts the runs in progress, of all rigs.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Runs(Arc<watch::Sender<usize>>);
+
+/// A run that is counted, while it is kept.
+struct Counted<'a>(&'a watch::Sender<usize>);
+
+impl Runs {
+    /// Counts an engine's runs until it is dropped.
+    pub(crate) async fn count(&self, engine: &Engine) {
+        let mut state = engine.state();
+        loop {
+            if state.wait_for(|state| is_in_progress(state.phase())).await.is_err() {
+                return;
+            }
+            self.0.send_modify(|runs| *runs += 1);
+            let _counted = Counted(&self.0);
+            if state.wait_for(|state| !is_in_progress(state.phase())).await.is_err() {
+                return;
+            }
+        }
+    }
+}
+
+impl Drop for Counted<'_> {
+    fn drop(&mut self) {
+        self.0.send_modify(|runs| *runs -= 1);
+    }
+}
+
 /// Holds a lock against sleep while a run is in progress, as well as the machine allows. No run waits for it.
-pub(crate) async fn keep_awake(engine: Engine) {
-    let mut state = engine.state();
+pub(crate) async fn keep_awake(runs: Runs) {
+    let mut runs = runs.0.subscribe();
     let mut advice = Advice::default();
     loop {
-        if state.wait_for(|state| is_in_progress(state.phase())).await.is_err() {
+        if runs.wait_for(|runs| *runs > 0).await.is_err() {
             return;
         }
         let lock = spawn_blocking(take).await;
-        if state.wait_for(|state| !is_in_progress(state.phase())).await.is_err() {
+        if runs.wait_for(|runs| *runs == 0).await.is_err() {
             return;
         }
         match lock {

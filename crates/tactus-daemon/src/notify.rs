@@ -1,6 +1,8 @@
 //! Notifications for systemd: ready, alive, stopping. Without systemd nobody is notified.
 
+use std::collections::BTreeMap;
 use std::io;
+use std::sync::Arc;
 use std::sync::mpsc::{self, SyncSender};
 use std::thread;
 use std::time::Duration;
@@ -12,6 +14,8 @@ use tactus_schema::MonoTime;
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 use tracing::{error, info, warn};
+
+use crate::service::{CommandDesk, RunningDesks};
 
 /// The watchdog's limit where systemd sets none.
 const LIMIT: Duration = Duration::from_secs(2);
@@ -26,7 +30,8 @@ pub(crate) struct Systemd(SyncSender<Message>);
 /// What systemd is told.
 #[derive(Debug)]
 enum Message {
-    Ready { rig: String },
+    Ready { status: String },
+    Status(String),
     Alive,
     Hangs,
     Stopping,
@@ -43,8 +48,13 @@ impl Systemd {
     }
 
     /// Frames flow: the service is ready.
-    pub(crate) fn ready(&self, rig: &str) {
-        self.tell(Message::Ready { rig: rig.to_owned() });
+    pub(crate) fn ready(&self, status: &str) {
+        self.tell(Message::Ready { status: status.to_owned() });
+    }
+
+    /// How the service stands, in a line.
+    pub(crate) fn status(&self, status: &str) {
+        self.tell(Message::Status(status.to_owned()));
     }
 
     /// The service is closing down.
@@ -62,12 +72,9 @@ impl Systemd {
 
 impl Message {
     fn write(self) {
-        let status;
-        let states = match self {
-            Self::Ready { rig } => {
-                status = format!("rig {rig}: frames flow");
-                vec![NotifyState::Ready, NotifyState::Status(&status)]
-            }
+        let states = match &self {
+            Self::Ready { status } => vec![NotifyState::Ready, NotifyState::Status(status)],
+            Self::Status(status) => vec![NotifyState::Status(status)],
             Self::Alive => vec![NotifyState::Watchdog],
             Self::Hangs => vec![NotifyState::WatchdogTrigger],
             Self::Stopping => vec![NotifyState::Stopping],
@@ -78,40 +85,74 @@ impl Message {
     }
 }
 
-/// Feeds the watchdog while every part of the service makes progress. If one hangs, the stage is stopped; if it still hangs
-/// an eighth of the limit later, systemd is asked to end the service. A disk that hangs is no part of the service: the run fails
-/// by it, and the service goes on.
-pub(crate) async fn feed_watchdog(engine: Engine, recorder: watch::Receiver<Gauge>, systemd: Systemd) {
+/// Feeds the watchdog while every part of the service makes progress. If one hangs, its rig's stage is stopped. If a part of every
+/// rig still hangs an eighth of the limit later, systemd is asked to end the service; with several rigs, the runs of the others
+/// are more than what one that hangs could gain. A disk that hangs is no part of the service: the run fails by it, and the service goes on.
+pub(crate) async fn feed_watchdog(desks: RunningDesks, systemd: Systemd) {
     let asked = sd_notify::watchdog_enabled();
     let limit = asked.unwrap_or(LIMIT);
-    let mut watch = Watch::new(engine.clock().now().mono, limit / 2);
-    let mut recorded = Changes::default();
+    let mut watched: BTreeMap<Arc<str>, WatchedRig> = BTreeMap::new();
     let mut tick = interval((limit / 8).max(Duration::from_millis(1)));
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         tick.tick().await;
+        let desks = desks.of(None);
+        watched.retain(|rig, of| desks.iter().any(|(name, desk)| name == rig && Arc::ptr_eq(desk, &of.desk)));
+        let (mut hanging, mut still_hanging) = (0, 0);
+        for (rig, desk) in &desks {
+            let watched = watched.entry(Arc::clone(rig)).or_insert_with(|| WatchedRig::new(desk, limit / 2));
+            match watched.look(rig) {
+                Liveness::Alive | Liveness::Recovered => {}
+                Liveness::Hangs(_) => hanging += 1,
+                Liveness::StillHangs(_) => still_hanging += 1,
+            }
+        }
+        if asked.is_none() {
+            continue;
+        }
+        if desks.is_empty() || hanging + still_hanging < desks.len() {
+            systemd.tell(Message::Alive);
+        } else if still_hanging == desks.len() {
+            systemd.tell(Message::Hangs);
+        }
+    }
+}
+
+/// A rig, as the watchdog sees it.
+struct WatchedRig {
+    desk: Arc<CommandDesk>,
+    recorder: watch::Receiver<Gauge>,
+    recorded: Changes,
+    watch: Watch,
+}
+
+impl WatchedRig {
+    fn new(desk: &Arc<CommandDesk>, patience: Duration) -> Self {
+        let watch = Watch::new(desk.engine().clock().now().mono, patience);
+        Self { desk: Arc::clone(desk), recorder: desk.recorder(), recorded: Changes::default(), watch }
+    }
+
+    /// Stops the stage of a rig that hangs.
+    fn look(&mut self, rig: &str) -> Liveness {
+        let engine = self.desk.engine();
         let now = engine.clock().now().mono;
-        let sign = recorder.borrow().sign_of_life();
-        let progress = Progress { recorder: recorded.look(sign, now), ..Progress::of(&engine) };
-        match watch.judge(progress, now) {
-            Liveness::Alive => {}
-            Liveness::Recovered => info!("every part of the service goes on again"),
+        let sign = self.recorder.borrow().sign_of_life();
+        let progress = Progress { recorder: self.recorded.look(sign, now), ..Progress::of(engine) };
+        let liveness = self.watch.judge(progress, now);
+        match liveness {
+            Liveness::Alive | Liveness::StillHangs(_) => {}
+            Liveness::Recovered => {
+                self.desk.tell_hanging("");
+                info!(rig, "every part goes on again");
+            }
             Liveness::Hangs(part) => {
-                error!("{part} does not go on: the stage is stopped");
+                self.desk.tell_hanging(part);
+                error!(rig, "{part} does not go on: the stage is stopped");
                 let reason = format!("{part} does not go on");
                 engine.stop(StopOrder { by: "watchdog".into(), reason, abort: false });
-                continue;
-            }
-            Liveness::StillHangs(_) => {
-                if asked.is_some() {
-                    systemd.tell(Message::Hangs);
-                }
-                continue;
             }
         }
-        if asked.is_some() {
-            systemd.tell(Message::Alive);
-        }
+        liveness
     }
 }
 

@@ -1,16 +1,25 @@
-//! The service: acquires frames from start to end, answers commands, runs experiments.
+//! The service: acquires frames from start to end, answers commands, runs experiments; for one rig or many.
+//!
+//! Of each rig:
 //!
 //! | task | waits for |
 //! |---|---|
 //! | acquisition (in the engine) | frames, reports of the stage, the supervisor's clock |
-//! | stops (a thread) | `cmd/stop`, `tactus/stop` and datagrams; nothing else, so that no other command can delay it |
-//! | commands | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status`, `cmd/experiments`, `cmd/plan` |
+//! | rig | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status`, `cmd/experiments`, `cmd/plan`; a second, for the health; a failure, to start the rig again |
 //! | run | the order of one run, until its recording is closed |
-//! | health | once a second |
 //! | closing of crashed runs (once, at the start) | the disk |
+//!
+//! Of the service:
+//!
+//! | task | waits for |
+//! |---|---|
+//! | stops (a thread) | `cmd/stop`, `tactus/stop` and datagrams; nothing else, so that no other command can delay it |
 //! | watchdog | an eighth of systemd's limit |
-//! | inhibitor | the beginning and the end of a run |
+//! | inhibitor | the beginning of the first run in progress and the end of the last |
+//! | standings | a rig that starts or fails |
 //! | main | a signal that ends the service |
+//!
+//! Rigs share the session on the bus, and no lock that a frame takes.
 
 mod catalogue;
 mod commands;
@@ -18,37 +27,34 @@ mod description;
 mod health;
 mod lease;
 mod publish;
+mod rig;
+mod standing;
+mod stops;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::thread;
-use std::time::Duration;
 
 use clap::{CommandFactory, Parser};
-use tactus_bus::{Bus, BusConfig, BusError, Calls, TlsConfig};
-use tactus_device::Clock;
-use tactus_engine::{Engine, EngineError, StopOrder};
+use tactus_bus::{BusConfig, BusError, Node, TlsConfig};
 use tactus_log::LogFormat;
-use tactus_runner::config::{ConfigError, RigFiles, ServiceConfig, TlsSection};
-use tactus_runner::covering_file::CoveringFile;
-use tactus_runner::crashed::{self, Crashed};
-use tactus_runner::devices;
-use tactus_runner::embedded::Truth;
+use tactus_runner::config::{ConfigError, ServiceConfig, TlsSection};
 use tactus_runner::signals::EndingSignals;
 use tactus_schema::key::Keys;
 use tokio::runtime::Handle;
-use tokio::task::JoinHandle;
-use tokio::time::timeout;
-use tracing::{error, info};
+use tokio::sync::watch;
+use tokio::task::JoinSet;
+use tracing::{Instrument, Span, error, info, info_span};
 
-use crate::inhibitor;
+use crate::inhibitor::{self, Runs};
 use crate::notify::{self, Systemd};
-use commands::CommandDesk;
-use publish::BusPublisher;
+use rig::{RigError, Service};
+use standing::Standings;
+use stops::Desks;
 
-/// Time for a run to retract and close its recording at shutdown.
-const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(30);
+pub(crate) use commands::CommandDesk;
+pub(crate) use stops::Desks as RunningDesks;
 
 /// The lab service of Tactus.
 #[derive(Debug, Parser)]
@@ -71,13 +77,11 @@ enum ServiceError {
     #[error(transparent)]
     Config(#[from] ConfigError),
     #[error(transparent)]
-    Engine(#[from] EngineError),
-    #[error(transparent)]
     Bus(#[from] BusError),
+    #[error(transparent)]
+    Rig(#[from] RigError),
     #[error("the system provides no {what}: {source}")]
     System { what: &'static str, source: std::io::Error },
-    #[error("the run did not close within {SHUTDOWN_TIMEOUT:?}: its recording may lack its end")]
-    Hung,
 }
 
 /// The options of `tactusd`.
@@ -130,112 +134,90 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     let mut signals = EndingSignals::listen().map_err(system("signals"))?;
 
     let systemd = Systemd::start().map_err(system("thread"))?;
-    let rig = &config.rig.rig;
-    let keys = Keys::new(rig.name.clone());
-    info!(rig = rig.name, simulated = rig.simulated, recordings = %config.recordings.display(), "tactusd starts");
+    let names = names(&config);
+    let simulated = config.rigs.served.iter().all(|files| files.rig.simulated);
+    info!(rigs = names.join(", "), simulated, recordings = %config.recordings.display(), "tactusd starts");
     let endpoints = BusConfig {
         listen: config.bus.listen.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         connect: config.bus.connect.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         guests: config.bus.guests.clone(),
         tls: config.bus.tls.clone().map(certificates),
     };
-    let recordings = config.recordings.clone();
-    let closing = tokio::task::spawn_blocking(move || crashed::close_all(&recordings));
-    let (bus, calls) = Bus::open(&endpoints, keys).await?;
-    let served = attend(config, &bus, calls, &systemd, &mut signals, closing).await;
-    // Whatever has happened: no thread of ours may be in the bus's library when the process ends.
-    bus.close().await?;
-    info!("closed");
-    served
-}
+    let keys: Vec<_> = names.into_iter().map(Keys::new).collect();
+    let (node, stops) = Node::open(&endpoints, &keys).await?;
+    let rigs = rig::all(&node, &config).await?;
+    // The last rig closes it.
+    drop(node);
 
-/// Acquires frames and answers commands until a signal ends the service.
-async fn attend(
-    config: ServiceConfig,
-    bus: &Bus,
-    Calls { stops, commands }: Calls,
-    systemd: &Systemd,
-    signals: &mut EndingSignals,
-    closing: JoinHandle<Vec<Crashed>>,
-) -> Result<(), ServiceError> {
-    let system = |what| move |source| ServiceError::System { what, source };
-    let clock = Clock::real();
-    let RigFiles { rig, codec, .. } = config.rig.clone();
-    let Some(rig_service) = rig.service.clone() else {
-        return Err(EngineError::NoService { rig: rig.name }.into());
-    };
-    let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
-    let mut opened = devices::open(&rig, &rig_service, codec, truth, clock);
-    if opened.devices.change_covering.is_none() {
-        // A person changes the covering, and may do so while the service is down.
-        let file = CoveringFile::of(&rig.name, &config.recordings);
-        opened.devices.covering_memory = Some(Arc::new(file));
-    }
-    let engine = Engine::start(rig, opened.devices, clock, Arc::new(BusPublisher(bus.publisher())))?;
-
-    let desk = Arc::new(CommandDesk::new(engine.clone(), config, bus.publisher()));
+    let (end, ending) = watch::channel(None);
+    let service = Arc::new(Service {
+        config,
+        desks: Desks::default(),
+        standings: Standings::default(),
+        runs: Runs::default(),
+        ending,
+    });
     // A thread of its own: no task that waits or computes can keep it from running. It ends with the bus.
-    let (stop_desk, runtime) = (Arc::clone(&desk), Handle::current());
+    let (desks, runtime) = (service.desks.clone(), Handle::current());
     thread::Builder::new()
         .name("stops".into())
         .spawn(move || {
             let _entered = runtime.enter();
-            stop_desk.answer_stops(stops);
+            stops::answer(&desks, stops);
         })
         .map_err(system("thread"))?;
     let tasks = [
-        tokio::spawn(Arc::clone(&desk).answer_commands(commands)),
-        tokio::spawn(health::publish(engine.clone(), bus.publisher(), {
-            let desk = Arc::clone(&desk);
-            move || desk.holder()
-        })),
-        tokio::spawn(notify::feed_watchdog(engine.clone(), desk.recorder(), systemd.clone())),
-        tokio::spawn(inhibitor::keep_awake(engine.clone())),
+        tokio::spawn(notify::feed_watchdog(service.desks.clone(), systemd.clone())),
+        tokio::spawn(inhibitor::keep_awake(service.runs.clone())),
+        tokio::spawn({
+            let (standings, systemd) = (service.standings.clone(), systemd.clone());
+            async move { standings.tell(&systemd).await }
+        }),
     ];
+    let are_several = service.config.rigs.are_several;
+    let mut keeping = JoinSet::new();
+    for rig in rigs {
+        // With one rig its name would only lengthen each line.
+        let span = if are_several { info_span!("rig", name = &*rig.name) } else { Span::none() };
+        keeping.spawn(rig.keep(Arc::clone(&service)).instrument(span));
+    }
 
-    let mut alive = None;
-    let signalled = tokio::select! {
+    let (signalled, mut first) = tokio::select! {
         biased;
-        ending = signals.next() => ending.name,
-        never = async {
-            frames_flow(&engine).await;
-            if closing.await.is_err() {
-                error!("the recordings were not checked for crashed runs: this is a defect of Tactus");
-            }
-            alive = Some(bus.declare_alive().await);
-            systemd.ready(&engine.rig().name);
-            info!("ready: frames flow");
-            std::future::pending::<&str>().await
-        } => never,
+        ending = signals.next() => (ending.name, None),
+        kept = keeping.join_next() => ("a rig has ended", kept),
     };
     info!("{signalled}: closing down");
     systemd.stopping();
-    let closed = end_run(&engine, signalled).await;
-    drop(alive);
+    end.send_replace(Some(signalled));
+    let mut closed = Ok(());
+    while let Some(kept) = match first.take() {
+        None => keeping.join_next().await,
+        first => first,
+    } {
+        match kept {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => closed = Err(error.into()),
+            Err(panic) => error!(%panic, "the keeper of a rig broke off: this is a defect of Tactus"),
+        }
+    }
     for task in tasks {
         task.abort();
     }
+    info!("closed");
     closed
+}
+
+/// The names of all rigs, served or refused.
+fn names(config: &ServiceConfig) -> Vec<String> {
+    let served = config.rigs.served.iter().map(|files| files.rig.name.clone());
+    let mut names: Vec<_> = served.chain(config.rigs.refused.iter().map(|rig| rig.name.clone())).collect();
+    names.sort();
+    names.dedup();
+    names
 }
 
 fn certificates(tls: TlsSection) -> TlsConfig {
     let TlsSection { authority, certificate, key, commanders, readers, check_certificate, check_key } = tls;
     TlsConfig { authority, certificate, key, commanders, readers, check: check_certificate.zip(check_key) }
-}
-
-async fn frames_flow(engine: &Engine) {
-    let mut pulse = engine.pulse();
-    if pulse.wait_for(|pulse| pulse.sensor_connected && pulse.frames > 1).await.is_err() {
-        std::future::pending::<()>().await;
-    }
-}
-
-/// Ends the run in progress: stop, retract, close the recording.
-async fn end_run(engine: &Engine, signalled: &str) -> Result<(), ServiceError> {
-    engine.stop(StopOrder {
-        by: "signal".into(),
-        reason: format!("{signalled}: the service closes down"),
-        abort: false,
-    });
-    timeout(SHUTDOWN_TIMEOUT, engine.released()).await.map_err(|_| ServiceError::Hung)
 }

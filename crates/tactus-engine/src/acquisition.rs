@@ -139,7 +139,10 @@ pub(crate) async fn acquire(
                     acquisition.attempt("a frame was handled", |this| this.on_sensor(event))
                 } else {
                     has_sensor = false;
-                    acquisition.shared.pulse.send_modify(|pulse| pulse.sensor_connected = false);
+                    acquisition.shared.pulse.send_modify(|pulse| {
+                        pulse.sensor_connected = false;
+                        pulse.sensor_broke_off = true;
+                    });
                     Err("the sensor was read")
                 }
             }

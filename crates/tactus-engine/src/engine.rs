@@ -13,6 +13,7 @@ use tactus_schema::rig::Service;
 use tactus_schema::{MonoTime, Rig, pb};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
+use tracing::Instrument;
 
 use crate::acquisition::{Gone, Mailbox, acquire, mailbox};
 use crate::motion::WayUp;
@@ -90,6 +91,8 @@ pub struct Pulse {
     pub frames_lost: u64,
     /// True while the sensor answers.
     pub sensor_connected: bool,
+    /// The sensor's driver broke off by a defect: only another engine reads the sensor again.
+    pub sensor_broke_off: bool,
     /// Arrival time of the last frame.
     pub last_frame: MonoTime,
     /// Time of the supervisor's last check of the clock.
@@ -266,7 +269,9 @@ impl Engine {
         });
         let acquiring =
             acquire(Arc::clone(&shared), supervisor, questions, devices.sensor, devices.stage_reports);
-        Ok(Self { shared, acquisition: Arc::new(AcquisitionTask(tokio::spawn(acquiring))) })
+        // What it logs names the rig, if the caller's span does.
+        let task = tokio::spawn(acquiring.in_current_span());
+        Ok(Self { shared, acquisition: Arc::new(AcquisitionTask(task)) })
     }
 
     /// The rig, with the covering that is in place now.

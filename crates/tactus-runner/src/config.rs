@@ -1,4 +1,6 @@
-//! The service's configuration file, `tactusd.toml`.
+//! The service's configuration file, `tactusd.toml`, and the rig files that it names.
+
+mod rigs;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,11 +12,13 @@ use tactus_schema::{Rig, RigError};
 
 use crate::order::Texts;
 
-/// The checked configuration, with the rig that it names.
+pub use rigs::{RefusedRig, Rigs, files_in_folder};
+
+/// The checked configuration, with the rigs that it names.
 #[derive(Debug, Clone)]
 pub struct ServiceConfig {
-    /// The rig file, with the files that it names.
-    pub rig: RigFiles,
+    /// The rigs.
+    pub rigs: Rigs,
     /// Folder of experiment scripts, searched before the built-in ones.
     pub experiments: Option<PathBuf>,
     /// Folder of recordings.
@@ -28,6 +32,8 @@ pub struct ServiceConfig {
 /// A rig, the format of its sensor, and the texts of their files.
 #[derive(Debug, Clone)]
 pub struct RigFiles {
+    /// The rig file.
+    pub path: PathBuf,
     /// The checked rig.
     pub rig: Rig,
     /// Protocol of its sensor.
@@ -118,6 +124,15 @@ pub enum ConfigError {
     /// The folder of experiments does not exist.
     #[error("{}: experiments = {folder:?} is no folder", path.display())]
     Experiments { path: PathBuf, folder: PathBuf },
+    /// Neither one rig nor several, or both.
+    #[error("{}: name one rig (`rig = \"rig.toml\"`) or several (`rigs = \"FOLDER\"` or a list of files), and not both", path.display())]
+    Rigs { path: PathBuf },
+    /// There is no rig file.
+    #[error("{}: no rig file (*.toml) is there", path.display())]
+    NoRigs { path: PathBuf },
+    /// No rig file can be used.
+    #[error("no rig can be served:\n{}", refused.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    AllRefused { refused: Vec<RefusedRig> },
     /// The rig describes data, not a service.
     #[error("{}: a service needs the tables envelope, motion, policy, sensor and stage", path.display())]
     NoService { path: PathBuf },
@@ -126,13 +141,17 @@ pub enum ConfigError {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawConfig {
-    /// The rig file.
-    rig: PathBuf,
+    /// The rig file, if the service has one rig.
+    #[serde(default)]
+    rig: Option<PathBuf>,
+    /// The folder of rig files, or a list of them, if it has several. A rig whose file cannot be used is not served; the others are.
+    #[serde(default)]
+    rigs: Option<RawRigs>,
     /// Folder of experiment scripts, searched before the built-in ones.
     #[serde(default)]
     experiments: Option<PathBuf>,
-    /// Folder of recordings, `runs` without the key. Relative to systemd's state directory if there is one,
-    /// else to the working directory.
+    /// Folder of recordings, `runs` without the key; with `rigs`, each rig has a folder of its name in it. Relative to systemd's state
+    /// directory if there is one, else to the working directory.
     #[serde(default = "runs")]
     recordings: PathBuf,
     /// Where the service listens, and to whom it connects.
@@ -141,6 +160,13 @@ struct RawConfig {
     /// Format and filter of the log.
     #[serde(default)]
     log: LogSection,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum RawRigs {
+    Folder(PathBuf),
+    Files(Vec<PathBuf>),
 }
 
 impl Default for BusSection {
@@ -156,7 +182,7 @@ impl Default for LogSection {
 }
 
 impl ServiceConfig {
-    /// Reads and checks the file, the rig file that it names, and the files that the rig file names. Paths are relative to
+    /// Reads and checks the file, the rig files that it names, and the files that they name. Paths are relative to
     /// the configuration's folder, except `recordings`: that is relative to systemd's state directory if there is one, else
     /// to the working directory.
     ///
@@ -166,14 +192,28 @@ impl ServiceConfig {
         let raw: RawConfig = toml::from_str(&read(path)?)
             .map_err(|source| ConfigError::Form { path: path.to_owned(), source })?;
         let folder = path.parent().unwrap_or(Path::new("."));
-        let rig = load_rig(&folder.join(raw.rig))?;
+        let rigs = match (raw.rig, raw.rigs) {
+            (Some(rig), None) => Rigs::one(load_rig(&folder.join(rig))?),
+            (None, Some(RawRigs::Folder(rigs))) => Rigs::load(files_in_folder(&folder.join(rigs))?)?,
+            (None, Some(RawRigs::Files(files))) if !files.is_empty() => {
+                Rigs::load(files.into_iter().map(|file| folder.join(file)).collect())?
+            }
+            (None | Some(_), _) => return Err(ConfigError::Rigs { path: path.to_owned() }),
+        };
         let experiments = raw.experiments.map(|experiments| folder.join(experiments));
         if let Some(folder) = experiments.clone().filter(|folder| !folder.is_dir()) {
             return Err(ConfigError::Experiments { path: path.to_owned(), folder });
         }
         let state = std::env::var_os("STATE_DIRECTORY").map(PathBuf::from).unwrap_or_default();
         let bus = raw.bus.beside(folder);
-        Ok(Self { rig, experiments, recordings: state.join(raw.recordings), bus, log: raw.log })
+        Ok(Self { rigs, experiments, recordings: state.join(raw.recordings), bus, log: raw.log })
+    }
+}
+
+impl ServiceConfig {
+    /// Folder of a rig's recordings.
+    pub fn recordings_of(&self, rig: &str) -> PathBuf {
+        if self.rigs.are_several { self.recordings.join(rig) } else { self.recordings.clone() }
     }
 }
 
@@ -205,7 +245,7 @@ impl RigFiles {
         }
         let (codec, link) = SensorCodec::load(&rig, path)?;
         let texts = RigTexts { rig_toml: text.to_owned(), link_toml: link.map(|link| link.text) };
-        Ok(Self { rig, codec, texts })
+        Ok(Self { path: path.to_owned(), rig, codec, texts })
     }
 }
 

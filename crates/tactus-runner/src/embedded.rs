@@ -105,7 +105,7 @@ pub fn truth(rig: &Rig) -> Option<Truth> {
 /// # Errors
 /// [`EmbeddedError`] if there was no run at all; how a run ended is in [`Finished`].
 pub fn run(
-    RigFiles { rig, codec, texts }: &RigFiles,
+    RigFiles { rig, codec, texts, .. }: &RigFiles,
     truth: Option<&TruthFile>,
     request: RunRequest,
     folder: &Path,

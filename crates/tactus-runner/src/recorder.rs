@@ -12,7 +12,7 @@ mod backlog;
 mod life;
 
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -26,7 +26,7 @@ use backlog::{Backlog, Lag};
 use life::{Life, Living, Watched};
 
 /// Capacity of the queue to the disk, in messages. The backlog's age fails a run earlier, except at rates beyond 4 kHz.
-const QUEUE: usize = 4096;
+const QUEUE: u64 = 4096;
 
 /// Without messages for this time, the current chunk is closed.
 const IDLE: Duration = Duration::from_millis(250);
@@ -53,7 +53,7 @@ pub struct DirectRecorder(pub Recording);
 /// Queues everything for a thread, so that a slow disk never delays acquisition.
 #[derive(Debug)]
 pub struct ThreadRecorder {
-    entries: SyncSender<Entry>,
+    entries: Sender<Entry>,
     backlog: Backlog,
     /// What found the queue full.
     refused: Missing,
@@ -284,7 +284,8 @@ impl ThreadRecorder {
         gauge.reset();
         let path = recording.path().display().to_string();
         // Overflow policy: never dropped; a full queue is an error that fails the run.
-        let (entries, queue) = sync_channel(QUEUE);
+        // Its bound is checked before each message: a bounded channel would take the memory of a full queue at once.
+        let (entries, queue) = channel();
         // The result of one recording.
         let (end, ended) = sync_channel(1);
         let sync = recording.sync_handle().map_err(std::io::Error::other)?;
@@ -360,25 +361,20 @@ impl ThreadRecorder {
 
     fn queue(&mut self, entry: Entry) -> Result<(), RecordFailure> {
         let (at, bytes, is_frame) = (entry.at(), entry.bytes(), matches!(entry, Entry::Frame(_)));
-        let refusal = self.entries.try_send(entry).err();
-        if refusal.is_some() {
+        self.backlog.settle(self.gauge.written());
+        if self.backlog.messages() >= QUEUE {
             self.refused = self.refused.plus(Missing::message(is_frame));
+            self.check(at)?;
+            let age = self.gauge.backlog(at);
+            return Err(self.late(age));
         }
-        match refusal {
-            None => {
-                self.backlog.queued(at, bytes, is_frame);
-                self.check(at)
-            }
-            Some(TrySendError::Full(_)) => {
-                self.check(at)?;
-                let age = self.gauge.backlog(at);
-                Err(self.late(age))
-            }
-            Some(TrySendError::Disconnected(_)) => {
-                self.check(at)?;
-                Err(RecordFailure(Box::new(QueueError::Gone)))
-            }
+        if self.entries.send(entry).is_err() {
+            self.refused = self.refused.plus(Missing::message(is_frame));
+            self.check(at)?;
+            return Err(RecordFailure(Box::new(QueueError::Gone)));
         }
+        self.backlog.queued(at, bytes, is_frame);
+        self.check(at)
     }
 
     fn late(&self, age: Duration) -> RecordFailure {

@@ -412,6 +412,8 @@ pub struct Health {
     pub simulated: bool,
     #[prost(string, tag = "14")]
     pub lease_holder: ::prost::alloc::string::String,
+    #[prost(string, tag = "15")]
+    pub problem: ::prost::alloc::string::String,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct RunRequest {

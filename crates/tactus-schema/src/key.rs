@@ -130,6 +130,17 @@ impl Keys {
         format!("tactus/{}/{}", self.rig, command.suffix())
     }
 
+    /// All its commands, such as `tactus/sim/cmd/*`: what the service listens to.
+    pub fn commands(&self) -> String {
+        format!("tactus/{}/cmd/*", self.rig)
+    }
+
+    /// The command that has exactly this key.
+    pub fn command_at(&self, key: &str) -> Option<Command> {
+        let suffix = key.strip_prefix("tactus/")?.strip_prefix(&*self.rig)?.strip_prefix('/')?;
+        Command::ALL.into_iter().find(|command| command.suffix() == suffix)
+    }
+
     /// Key of the liveliness token that the service holds from its start: `instance` is the id of its session on the bus,
     /// which its answers and messages carry.
     pub fn instance(&self, instance: &str) -> String {

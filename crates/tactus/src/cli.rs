@@ -73,7 +73,7 @@ enum CliCommand {
     /// What experiment scripts can say.
     #[command(subcommand)]
     Script(ScriptCommand),
-    /// Show what the service is doing.
+    /// Show what the service is doing: one rig in detail, several in a table.
     Status,
     /// Stop motion now, retract and end the run.
     Stop(StopArgs),
@@ -680,7 +680,7 @@ enum LinkCommand {
 /// Arguments of `devices`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DevicesArgs {
-    /// A service's configuration; its rig is used instead of those in config/rigs and /etc/tactus/rigs.
+    /// A service's configuration; its rigs are used instead of those in config/rigs and /etc/tactus/rigs.
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
 }
@@ -746,7 +746,7 @@ pub(crate) struct StageCheckArgs {
 /// Arguments of `validate`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ValidateArgs {
-    /// .toml, .star, .parquet or .mcap files.
+    /// .toml, .star, .parquet or .mcap files; of a folder, the rig files in it, also against each other.
     #[arg(required = true)]
     pub(crate) files: Vec<PathBuf>,
 }

@@ -79,11 +79,25 @@ pub(crate) async fn look(common: &Common) -> anyhow::Result<Option<Client>> {
     match Client::connect_as(&endpoint, common.rig.as_deref(), &common.credentials()).await {
         Ok(client) => Ok(Some(client)),
         Err(BusError::NoService { .. }) => Ok(None),
+        Err(BusError::SeveralRigs { endpoint, rigs }) => {
+            Err(Failure::new(Exit::Usage, choose(&endpoint, &rigs)).into())
+        }
         Err(error @ (BusError::RigName { .. } | BusError::UnknownRig { .. })) => {
             Err(Failure::new(Exit::Usage, error).into())
         }
         Err(error) => Err(error.into()),
     }
+}
+
+/// What to do when there are several rigs: this command again, with the name of one.
+fn choose(endpoint: &str, rigs: &[String]) -> String {
+    let command: Vec<_> = std::env::args().skip(1).collect();
+    let one = rigs.first().map(String::as_str).unwrap_or_default();
+    format!(
+        "several rigs are served at {endpoint}: {}; name one: `tactus {} --rig {one}`",
+        rigs.join(", "),
+        command.join(" ")
+    )
 }
 
 /// Connects to the service at the endpoint.

@@ -1,7 +1,7 @@
 //! Output for people: aligned tables and durations.
 
 use std::fmt::Write as _;
-use std::io::{ErrorKind, Write as _};
+use std::io::{ErrorKind, IsTerminal as _, Write as _};
 
 /// Prints `name  value` lines with the values aligned.
 pub(crate) fn print_fields(fields: &[(&str, String)]) {
@@ -13,6 +13,26 @@ pub(crate) fn print_fields(fields: &[(&str, String)]) {
 
 /// Prints a table with a header, columns aligned to their widest cell.
 pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
+    table(header, rows).iter().for_each(|line| say(line));
+}
+
+/// As [`print_table`], with lines that end at the edge of the terminal: the last column gives way.
+pub(crate) fn print_table_cut(header: &[&str], rows: &[Vec<String>]) {
+    let is_terminal = std::io::stdout().is_terminal();
+    let size = is_terminal.then(|| ratatui::crossterm::terminal::size().ok()).flatten();
+    let width = size.map_or(usize::MAX, |(columns, _)| usize::from(columns).max(1));
+    table(header, rows).iter().for_each(|line| say(&cut(line, width)));
+}
+
+/// A line of at most so many characters; an ellipsis says that something is missing.
+fn cut(line: &str, width: usize) -> String {
+    if line.chars().count() <= width {
+        return line.to_owned();
+    }
+    line.chars().take(width.saturating_sub(1)).chain(['…']).collect()
+}
+
+fn table(header: &[&str], rows: &[Vec<String>]) -> Vec<String> {
     let mut widths: Vec<_> = header.iter().map(|cell| cell.chars().count()).collect();
     for row in rows {
         for (width, cell) in widths.iter_mut().zip(row) {
@@ -25,12 +45,10 @@ pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
             // Writing to a string cannot fail.
             let _written = write!(line, "{cell:width$}  ");
         }
-        say(line.trim_end());
+        line.trim_end().to_owned()
     };
-    line(&mut header.iter().copied());
-    for row in rows {
-        line(&mut row.iter().map(String::as_str));
-    }
+    let header = line(&mut header.iter().copied());
+    [header].into_iter().chain(rows.iter().map(|row| line(&mut row.iter().map(String::as_str)))).collect()
 }
 
 /// Prints a line. If the reader closed the pipe, as `head` does, the program continues.

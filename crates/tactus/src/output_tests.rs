@@ -15,3 +15,12 @@ fn durations_are_in_words_without_sixty_seconds() {
         assert_eq!(duration(seconds), words);
     }
 }
+
+#[test]
+fn a_table_is_aligned_and_a_line_ends_at_the_edge() {
+    let rows = [vec!["left".to_owned(), "idle".to_owned()], vec!["b".to_owned(), "a long story".to_owned()]];
+    let lines = table(&["RIG", "WHAT"], &rows);
+    assert_eq!(lines, ["RIG   WHAT", "left  idle", "b     a long story"]);
+    assert_eq!(cut(&lines[2], 10), "b     a l…");
+    assert_eq!(cut(&lines[1], 10), "left  idle");
+}

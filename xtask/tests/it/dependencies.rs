@@ -55,7 +55,7 @@ const NEVER: [(&str, &[&str]); 8] = [
 /// benchmarks score on sets, and only `tactus-mock` has all of it. `xtask` asks that program for its options.
 const MAY_USE_MOCK: [(&str, &[&str]); 5] = [
     ("tactus-hidden", &["tactus-virtual", "tactus-sets", "tactus-mock", "tactus-bench"]),
-    ("tactus-virtual", &["tactus-usbip", "tactus-mock", "tactus-runner"]),
+    ("tactus-virtual", &["tactus-usbip", "tactus-mock", "tactus-runner", "tactus-bench"]),
     ("tactus-usbip", &["tactus-mock"]),
     ("tactus-sets", &["tactus-mock", "tactus-bench"]),
     ("tactus-mock", &["xtask"]),

@@ -41,8 +41,8 @@ def connect(endpoint: str | None = None, rig: str | None = None) -> Client:
     Without one it is ``TACTUS_ENDPOINT`` of the environment, else the socket of the installed service of this machine if there is one,
     else ``tcp/127.0.0.1:7447``.
 
-    Without ``rig`` it is ``TACTUS_RIG`` of the environment, else the rig of the service that listens there or, if that is a router, the
-    only rig that is ready.
+    Without ``rig`` it is ``TACTUS_RIG`` of the environment, else the only rig of the service that listens there or, if that is a router,
+    the only rig that is ready.
 
     Raises ``NoService`` at once if nothing listens there, ``NoRig`` if no rig is ready, or if several are ready and
     none was named, and ``ValueError`` if the endpoint or the rig's name is not valid.
@@ -322,12 +322,14 @@ def _config(endpoint: str) -> zenoh.Config:
 
 
 def _the_rig(services: Services, endpoint: str) -> str:
+    ready = services.rigs()
     own = services.own_rigs()
-    rigs = own if len(own) == 1 else services.rigs()
+    # Of a service of several rigs, none may take the place of one that is missing.
+    rigs = own if len(own) > 1 or (own and own[0] in ready) else ready
     if not rigs:
         raise NoRig(f"a bus listens at {endpoint}, but no rig is ready on it; its service may still be starting")
     if len(rigs) > 1:
-        raise NoRig(f"several rigs are ready at {endpoint}: {', '.join(rigs)}; name one")
+        raise NoRig(f"several rigs are served at {endpoint}: {', '.join(rigs)}; name one: connect(rig={rigs[0]!r})")
     return rigs[0]
 
 

@@ -43,9 +43,9 @@ class Services:
             return sorted(self._ready)
 
     def own_rigs(self) -> list[str]:
-        """Names of the ready rigs whose service is at the other end of our connection, sorted."""
+        """Names of the rigs, ready or not, whose service is at the other end of our connection, sorted."""
         with self._lock:
-            return sorted(rig for rig in self._ready if self._speaker(rig) in self.neighbours)
+            return sorted({rig for rig, _ in self._running if self._speaker(rig) in self.neighbours})
 
     def is_ambiguous(self, rig: str) -> bool:
         """True if several sessions say that they are the rig's, and none of them is at the other end of our connection."""

@@ -22,7 +22,7 @@ fn status() -> Vec<u8> {
 
 /// Answers every call with its own command and request.
 async fn echo(mut calls: mpsc::Receiver<CommandCall>) {
-    while let Some(CommandCall { command, request, reply }) = calls.recv().await {
+    while let Some(CommandCall { command, request, reply, .. }) = calls.recv().await {
         let version = format!("{command:?} {request:?}");
         reply.reply(pb::CommandReply { ok: true, rig: "bench".to_owned(), version, ..Default::default() });
     }

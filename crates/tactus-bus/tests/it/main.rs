@@ -6,6 +6,7 @@ mod commands;
 mod history;
 mod lab;
 mod liveliness;
+mod rigs;
 mod stalled;
 mod stop;
 #[cfg(feature = "tls")]

@@ -11,7 +11,7 @@ use std::time::Duration;
 use tactus_bus::{CommandCall, Publisher, Request};
 use tactus_engine::{Engine, ResetError, ResumeError, RunOrder, StopOrder};
 use tactus_plan::{Arguments, Evaluate, Script};
-use tactus_runner::config::ServiceConfig;
+use tactus_runner::config::RigTexts;
 use tactus_runner::continuation::{self, ContinuationError, Wish};
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::recorder::{Gauge, ThreadRecorder};
@@ -40,10 +40,21 @@ mod exit {
 /// Longest time in which a resumed run goes on.
 const RESUME_PATIENCE: Duration = Duration::from_secs(2);
 
+/// Where the runs of a rig come from and go to.
+#[derive(Debug, Clone)]
+pub(super) struct Places {
+    /// The texts of the rig's files, for recordings.
+    pub(super) texts: RigTexts,
+    /// Folder of its recordings.
+    pub(super) recordings: PathBuf,
+    /// Folder of experiment scripts.
+    pub(super) experiments: Option<PathBuf>,
+}
+
 /// Answers commands for one engine.
-pub(super) struct CommandDesk {
+pub(crate) struct CommandDesk {
     engine: Engine,
-    config: ServiceConfig,
+    places: Places,
     publisher: Publisher,
     lease: Mutex<Lease>,
     /// Of the last run.
@@ -53,6 +64,8 @@ pub(super) struct CommandDesk {
     plans: Arc<AtomicU64>,
     /// One list of experiments at a time: each script has a process for a moment.
     listing: Arc<Semaphore>,
+    /// The part of the rig that does not go on; empty if all do.
+    hanging: Mutex<&'static str>,
 }
 
 /// What a client wants to run.
@@ -86,41 +99,55 @@ struct Refusal {
 }
 
 impl CommandDesk {
-    pub(super) fn new(engine: Engine, config: ServiceConfig, publisher: Publisher) -> Self {
+    pub(super) fn new(engine: Engine, places: Places, publisher: Publisher) -> Self {
         let evaluator = Arc::new(ScriptProcesses::of_this_program());
         let recorder = watch::Sender::default();
         let (plans, listing) = (Arc::default(), Arc::new(Semaphore::new(1)));
-        Self { engine, config, publisher, lease: Mutex::default(), recorder, evaluator, plans, listing }
+        let (lease, hanging) = (Mutex::default(), Mutex::default());
+        Self { engine, places, publisher, lease, recorder, evaluator, plans, listing, hanging }
+    }
+
+    /// The engine that it commands.
+    pub(crate) fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    /// The watchdog tells which part does not go on; empty if all do.
+    pub(crate) fn tell_hanging(&self, part: &'static str) {
+        *self.hanging.lock().unwrap_or_else(PoisonError::into_inner) = part;
     }
 
     /// What the recorder of the last run shows. Each run has a recorder of its own: an old one may still wait for its disk.
-    pub(super) fn recorder(&self) -> watch::Receiver<Gauge> {
+    pub(crate) fn recorder(&self) -> watch::Receiver<Gauge> {
         self.recorder.subscribe()
     }
 
-    /// Stops want neither a lease nor a free task: this blocks a thread of its own.
-    pub(super) fn answer_stops(&self, mut stops: mpsc::Receiver<CommandCall>) {
-        while let Some(call) = stops.blocking_recv() {
-            let order = match call.request {
-                Request::Control(request) => {
-                    StopOrder { by: request.who, reason: request.reason, abort: request.abort }
-                }
-                Request::Run(_) | Request::Lease(_) => {
-                    StopOrder { by: "unknown".into(), reason: String::new(), abort: false }
-                }
-            };
-            let was_running = self.engine.stop(order.clone());
-            warn!(by = order.by, reason = order.reason, was_running, "stop");
-            call.reply.reply(self.reply(Ok(())));
-        }
+    /// Stops motion. Wants no lease and never waits.
+    pub(super) fn stop(&self, request: &Request) {
+        let order = match request.clone() {
+            Request::Control(request) => {
+                StopOrder { by: request.who, reason: request.reason, abort: request.abort }
+            }
+            Request::Run(_) | Request::Lease(_) => {
+                StopOrder { by: "unknown".into(), reason: String::new(), abort: false }
+            }
+        };
+        let was_running = self.engine.stop(order.clone());
+        warn!(by = order.by, reason = order.reason, was_running, "stop");
     }
 
-    pub(super) async fn answer_commands(self: Arc<Self>, mut commands: mpsc::Receiver<CommandCall>) {
+    /// The answer to a stop.
+    pub(super) fn stopped(&self) -> pb::CommandReply {
+        self.reply(Ok(()))
+    }
+
+    /// Answers until the channel is closed.
+    pub(super) async fn answer_commands(self: &Arc<Self>, commands: &mut mpsc::Receiver<CommandCall>) {
         while let Some(call) = commands.recv().await {
             match (call.command, call.request) {
                 (Command::Run, Request::Run(request)) => {
                     // A dry run takes a while: other commands are answered meanwhile.
-                    let desk = Arc::clone(&self);
+                    let desk = Arc::clone(self);
                     tokio::spawn(async move {
                         let reply = match desk.run(request).await {
                             Ok(note) => pb::CommandReply { note, ..desk.reply(Ok(())) },
@@ -131,7 +158,7 @@ impl CommandDesk {
                 }
                 (Command::Reset, Request::Control(request)) => {
                     // Homing takes a while.
-                    let desk = Arc::clone(&self);
+                    let desk = Arc::clone(self);
                     tokio::spawn(async move {
                         let done = desk.reset(&request).await;
                         call.reply.reply(desk.reply(done));
@@ -148,19 +175,19 @@ impl CommandDesk {
                     call.reply.reply(self.reply(self.pause(&request)));
                 }
                 (Command::Resume, Request::Control(request)) => {
-                    let desk = Arc::clone(&self);
+                    let desk = Arc::clone(self);
                     tokio::spawn(async move {
                         let done = desk.resume(&request).await;
                         call.reply.reply(desk.reply(done));
                     });
                 }
                 (Command::Status, Request::Control(_)) => {
-                    let rig_toml = self.config.rig.texts.rig_toml.clone();
+                    let rig_toml = self.places.texts.rig_toml.clone();
                     let description = describe(&self.engine.rig());
                     call.reply.reply(pb::CommandReply { rig_toml, description, ..self.reply(Ok(())) });
                 }
                 (Command::Experiments, Request::Control(_)) => {
-                    let desk = Arc::clone(&self);
+                    let desk = Arc::clone(self);
                     tokio::spawn(async move {
                         let reply = match desk.experiments().await {
                             Ok(experiments) => pb::CommandReply { experiments, ..desk.reply(Ok(())) },
@@ -170,7 +197,7 @@ impl CommandDesk {
                     });
                 }
                 (Command::Plan, Request::Run(request)) => {
-                    let desk = Arc::clone(&self);
+                    let desk = Arc::clone(self);
                     tokio::spawn(async move {
                         let reply = match desk.plan(request).await {
                             Ok(plan) => pb::CommandReply { plan: Some(plan), ..desk.reply(Ok(())) },
@@ -179,7 +206,7 @@ impl CommandDesk {
                         call.reply.reply(reply);
                     });
                 }
-                // The bus decodes each command's own request, and gives stops to `answer_stops`.
+                // The bus decodes each command's own request, and gives stops to their own channel.
                 (command, request) => {
                     warn!(?command, ?request, "a command with another command's request");
                     let error = "this is another command's request";
@@ -268,6 +295,17 @@ impl CommandDesk {
         self.lease().holder(now).map(|(holder, _)| holder.to_owned()).unwrap_or_default()
     }
 
+    /// The present health; the frame rate is over the time since `before`.
+    pub(super) fn health(&self, before: (u64, MonoTime)) -> pb::Health {
+        let hanging = *self.hanging.lock().unwrap_or_else(PoisonError::into_inner);
+        let health = health(&self.engine, &self.publisher, before, self.holder());
+        if hanging.is_empty() {
+            return health;
+        }
+        let problem = format!("{hanging} does not go on: this is a defect of Tactus; restart the service");
+        pb::Health { problem, ..health }
+    }
+
     async fn reset(&self, request: &pb::CommandRequest) -> Result<(), Refusal> {
         self.want_lease(&request.lease)?;
         info!(by = request.who, "reset: clearing the stage's alarm and homing");
@@ -308,9 +346,9 @@ impl CommandDesk {
         // Somebody may have taken it over during the dry run.
         self.want_lease(&lease)?;
         order.planned = Some(plan.promise());
-        let texts = self.config.rig.texts.all();
+        let texts = self.places.texts.all();
         let (recording, path) =
-            order::recording(&order, &rig, texts, &self.config.recordings, now).map_err(Refusal::failed)?;
+            order::recording(&order, &rig, texts, &self.places.recordings, now).map_err(Refusal::failed)?;
         let path = std::path::absolute(&path).unwrap_or(path);
         info!(run = order.run_id, recording = %path.display(), presses = plan.promise().presses, "run accepted");
         let gauge = Gauge::default();
@@ -326,7 +364,7 @@ impl CommandDesk {
 
     /// The experiments that are known by name.
     async fn experiments(&self) -> Result<Vec<pb::Experiment>, Refusal> {
-        let (rig, folder) = (self.engine.rig(), self.config.experiments.clone());
+        let (rig, folder) = (self.engine.rig(), self.places.experiments.clone());
         let evaluator = Arc::clone(&self.evaluator);
         let listing = Arc::clone(&self.listing).try_acquire_owned();
         let listing = listing.map_err(|_| Refusal::not_now("the experiments are being listed: ask again"))?;
@@ -376,7 +414,7 @@ impl CommandDesk {
     /// Checks the form of a request.
     fn wanted(&self, request: pb::RunRequest) -> Result<Wanted, Refusal> {
         let evaluator = Arc::clone(&self.evaluator);
-        let experiments = self.config.experiments.clone();
+        let experiments = self.places.experiments.clone();
         if request.continue_run.is_empty() {
             let script = self.script(&request)?;
             let arguments = Arguments::from_json(&request.parameters_json).map_err(Refusal::usage)?;
@@ -391,13 +429,13 @@ impl CommandDesk {
                 "a run that goes on with an earlier one has its script, parameters and seed: leave them out";
             return Err(Refusal::usage(error));
         }
-        let recordings = self.config.recordings.clone();
+        let recordings = self.places.recordings.clone();
         Ok(Wanted::Rest { run_id, who, evaluator, recordings, experiments })
     }
 
     fn script(&self, request: &pb::RunRequest) -> Result<Script, Refusal> {
         if request.script.is_empty() {
-            experiments::named(&request.experiment, self.config.experiments.as_deref())
+            experiments::named(&request.experiment, self.places.experiments.as_deref())
                 .map_err(Refusal::usage)
         } else {
             Script::parse(&request.experiment, &request.script).map_err(Refusal::usage)
@@ -418,7 +456,7 @@ impl CommandDesk {
             rig: rig.name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             stage: Some(self.engine.stage_state()),
-            health: Some(health(&self.engine, &self.publisher, (0, MonoTime::default()), self.holder())),
+            health: Some(self.health((0, MonoTime::default()))),
             lease: Some(told(&self.lease(), self.engine.clock().now().mono)),
             note: String::new(),
             rig_toml: String::new(),

@@ -6,12 +6,15 @@ use std::time::Duration;
 use tactus_bus::{Bus, BusConfig, Calls, Client, Endpoint, Hold};
 use tactus_device::Clock;
 use tactus_engine::Unpublished;
-use tactus_runner::config::RigFiles;
+use tactus_runner::config::{RigFiles, ServiceConfig};
 use tactus_runner::devices;
 use tactus_runner::embedded::Truth;
 use tactus_schema::key::Keys;
 use tokio::runtime::Handle;
 use tokio::sync::Barrier;
+use tokio::task::JoinHandle;
+
+use crate::service::stops::{self, Desks};
 
 use super::*;
 
@@ -29,15 +32,22 @@ fn answers_and_reports_of_the_stage_never_wait_for_each_other() {
 async fn lab(listen: Vec<Endpoint>) -> (Bus, Calls, CommandDesk) {
     let config = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/tactusd.toml"));
     let config = ServiceConfig::load(config).unwrap();
-    let RigFiles { rig, codec, .. } = config.rig.clone();
+    let RigFiles { rig, codec, texts, .. } = config.rigs.served[0].clone();
     let bus_config = BusConfig { listen, ..BusConfig::default() };
     let (bus, calls) = Bus::open(&bus_config, Keys::new(rig.name.clone())).await.unwrap();
     let clock = Clock::real();
     let service = rig.service.clone().unwrap();
     let opened = devices::open(&rig, &service, codec, || Truth::of_rig(&rig, 1), clock);
     let engine = Engine::start(rig, opened.devices, clock, Arc::new(Unpublished)).unwrap();
-    let desk = CommandDesk::new(engine, config, bus.publisher());
+    let places = Places { texts, recordings: config.recordings, experiments: config.experiments };
+    let desk = CommandDesk::new(engine, places, bus.publisher());
     (bus, calls, desk)
+}
+
+/// Answers the commands of a desk.
+fn answer(desk: &Arc<CommandDesk>, mut commands: tokio::sync::mpsc::Receiver<CommandCall>) -> JoinHandle<()> {
+    let desk = Arc::clone(desk);
+    tokio::spawn(async move { desk.answer_commands(&mut commands).await })
 }
 
 /// A client, and what it got when it asked for the lease.
@@ -59,13 +69,14 @@ async fn of_twenty_clients_one_gets_the_lease_and_only_its_commands_move_anythin
     let (bus, Calls { stops, commands }, desk) = lab(vec![endpoint.clone()]).await;
     let desk = Arc::new(desk);
     let stopping = thread::spawn({
-        let (desk, runtime) = (Arc::clone(&desk), Handle::current());
+        let (desks, runtime) = (Desks::default(), Handle::current());
+        desks.add(&"sim".into(), &desk);
         move || {
             let _entered = runtime.enter();
-            desk.answer_stops(stops);
+            stops::answer(&desks, stops);
         }
     });
-    let answering = tokio::spawn(Arc::clone(&desk).answer_commands(commands));
+    let answering = answer(&desk, commands);
 
     let start = Arc::new(Barrier::new(20));
     let racers = (0..20).map(|number| {
@@ -135,7 +146,7 @@ async fn of_twenty_clients_one_gets_the_lease_and_only_its_commands_move_anythin
 async fn of_two_clients_that_race_for_the_lease_one_gets_it_each_time() {
     let endpoint: Endpoint = free_endpoint();
     let (bus, calls, desk) = lab(vec![endpoint.clone()]).await;
-    let answering = tokio::spawn(Arc::new(desk).answer_commands(calls.commands));
+    let answering = answer(&Arc::new(desk), calls.commands);
     let clients = [
         Client::connect(&endpoint, Some("sim")).await.unwrap(),
         Client::connect(&endpoint, Some("sim")).await.unwrap(),
@@ -192,7 +203,7 @@ async fn the_experiments_are_listed_with_their_parameters_one_list_at_a_time() {
     desk.evaluator = Arc::new(tactus_plan::InThisProcess);
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("broken.star"), "def run(rig):\n    pass\nparam(1)\n").unwrap();
-    desk.config.experiments = Some(folder.path().to_owned());
+    desk.places.experiments = Some(folder.path().to_owned());
     let listed = desk.experiments().await.map_err(|refusal| refusal.error).unwrap();
     let image = listed.iter().find(|each| each.name == "image").unwrap();
     let depth = image.parameters.iter().find(|each| each.name == "depth_mm").unwrap();

@@ -3,27 +3,93 @@
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use tactus_bus::{BusError, Client};
 use tactus_schema::key::Command;
 use tactus_schema::{pb, with_message};
 
 use crate::cli::{Common, LeaseArgs, ResumeArgs, StopArgs};
 use crate::connection::{self, PATIENCE};
 use crate::exit::{Exit, Failure};
-use crate::output::{duration, print_fields, say_next};
+use crate::output::{duration, print_fields, print_table_cut, say_next};
 
 /// How long to wait for `reset`: homing is slow.
 const HOMING_PATIENCE: Duration = Duration::from_mins(2);
 
+/// Of one rig in detail or, if several are served and none is named, of all in a table.
 pub(crate) fn status(common: &Common) -> anyhow::Result<Exit> {
-    let reply = connection::runtime()?.block_on(async {
-        let client = connection::require(common).await?;
-        let request = pb::CommandRequest { who: connection::who(), ..Default::default() };
-        let reply = connection::ask(&client, Command::Status, &request, PATIENCE).await?;
-        client.close().await?;
-        anyhow::Ok(reply)
-    })?;
-    show(common, &reply);
-    Ok(Exit::Done)
+    let request = pb::CommandRequest { who: connection::who(), ..Default::default() };
+    connection::runtime()?.block_on(async {
+        if are_several(common).await? {
+            let (endpoint, credentials) = (connection::endpoint(common)?, common.credentials());
+            let asked = tactus_bus::ask_all(&endpoint, &credentials, Command::Status, &request, PATIENCE);
+            show_all(common, &asked.await?);
+        } else {
+            let client = connection::require(common).await?;
+            let reply = connection::ask(&client, Command::Status, &request, PATIENCE).await?;
+            client.close().await?;
+            show(common, &reply);
+        }
+        Ok(Exit::Done)
+    })
+}
+
+/// True if none is named and the service has several.
+async fn are_several(common: &Common) -> anyhow::Result<bool> {
+    if common.rig.is_some() {
+        return Ok(false);
+    }
+    match Client::connect_as(&connection::endpoint(common)?, None, &common.credentials()).await {
+        Ok(client) => client.close().await.map(|()| false).map_err(Into::into),
+        Err(BusError::SeveralRigs { .. }) => Ok(true),
+        // Whoever connects next says what is wrong.
+        Err(_) => Ok(false),
+    }
+}
+
+fn show_all(common: &Common, answers: &[(String, Option<pb::CommandReply>)]) {
+    if common.json {
+        let of_rig = |(rig, reply): &(String, Option<pb::CommandReply>)| match reply {
+            Some(reply) => to_json(reply),
+            None => json!({ "rig": rig, "problem": NO_ANSWER }),
+        };
+        println!("{}", json!({ "rigs": answers.iter().map(of_rig).collect::<Vec<_>>() }));
+        return;
+    }
+    let rows: Vec<_> = answers.iter().map(|(rig, reply)| row(rig, reply.as_ref())).collect();
+    print_table_cut(&["RIG", "STATE", "FRAMES", "LOST", "LEASE", "WHAT"], &rows);
+    say_next("`tactus status --rig NAME` shows one in detail");
+}
+
+const NO_ANSWER: &str = "it does not answer";
+
+/// A rig in a line: its state, and what a person should know first.
+fn row(rig: &str, reply: Option<&pb::CommandReply>) -> Vec<String> {
+    let reply = reply.cloned().unwrap_or_else(|| pb::CommandReply {
+        health: Some(pb::Health { problem: NO_ANSWER.to_owned(), ..Default::default() }),
+        ..Default::default()
+    });
+    let lease = holder(&reply).map_or_else(|| "-".to_owned(), |lease| lease.holder.clone());
+    let (state, health) = (reply.state.unwrap_or_default(), reply.health.unwrap_or_default());
+    let (word, what) = if !health.problem.is_empty() {
+        ("OFF", health.problem)
+    } else if !state.fault.is_empty() {
+        ("fault", state.fault)
+    } else if state.run_id.is_empty() {
+        ("idle", String::new())
+    } else {
+        let presses = format!("{}/{} presses", state.presses, state.presses_planned);
+        (state.phase().word(), format!("{}, {presses}", with_message(&state.run_id, &state.message)))
+    };
+    // One line, whatever the text has.
+    let what = what.split_whitespace().collect::<Vec<_>>().join(" ");
+    vec![
+        rig.to_owned(),
+        word.to_owned(),
+        health.frames.to_string(),
+        health.frames_lost.to_string(),
+        lease,
+        what,
+    ]
 }
 
 /// Needs no lease, no rig's name, and no service that is ready.
@@ -110,6 +176,7 @@ fn to_json(reply: &pb::CommandReply) -> Value {
         "rig": reply.rig,
         "version": reply.version,
         "simulated": health.simulated,
+        "problem": (!health.problem.is_empty()).then_some(&health.problem),
         "lease": holder(reply).map(|lease| json!({ "holder": lease.holder, "expires_in_s": lease.expires_in_s })),
         "fault": (!state.fault.is_empty()).then_some(&state.fault),
         "safety": {
@@ -189,6 +256,9 @@ fn print(reply: &pb::CommandReply) {
         _ => "no estimate of the device clock".into(),
     };
     let mut fields = vec![("rig", format!("{}{simulated}", reply.rig))];
+    if !health.problem.is_empty() {
+        fields.push(("problem", health.problem.clone()));
+    }
     if !state.fault.is_empty() {
         fields.push(("fault", fault_words(&state.fault)));
     }
@@ -209,6 +279,9 @@ fn print(reply: &pb::CommandReply) {
         ("lease", holder(reply).map_or_else(|| "nobody's".to_owned(), |lease| lease.holder.clone())),
         ("service", format!("version {}, up {}", reply.version, duration(health.uptime_s))),
     ]);
+    if !reply.note.is_empty() {
+        fields.push(("note", reply.note.clone()));
+    }
     print_fields(&fields);
     if let Some(next) = next_command(&state) {
         say_next(&next);

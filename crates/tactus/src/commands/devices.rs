@@ -66,7 +66,9 @@ impl Rigs {
             rigs.add(&config::load_rig(file)?.rig);
         }
         if let Some(config) = config {
-            rigs.add(&ServiceConfig::load(config)?.rig.rig);
+            let of_service = ServiceConfig::load(config)?.rigs;
+            of_service.served.iter().for_each(|files| rigs.add(&files.rig));
+            rigs.notes.extend(of_service.refused.iter().map(ToString::to_string));
         }
         if file.is_none() && config.is_none() {
             rigs.search(rig)?;

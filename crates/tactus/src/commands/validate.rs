@@ -1,12 +1,12 @@
 //! `validate`: checks files with the parsers that the service uses.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use serde_json::json;
 use tactus_plan::RigView;
 use tactus_record::Completeness;
-use tactus_runner::config::{self, ServiceConfig};
+use tactus_runner::config::{self, ConfigError, Rigs, ServiceConfig};
 use tactus_runner::embedded::{HIDDEN_SCHEMA, SIMULATED_RIG, TruthFile};
 use tactus_runner::experiments;
 use tactus_schema::{DraftFile, Model, Rig, draft, model, rig};
@@ -17,7 +17,7 @@ use crate::cli::{Common, ValidateArgs};
 use crate::exit::{Exit, in_words};
 
 pub(crate) fn validate(common: &Common, args: &ValidateArgs) -> Exit {
-    let results: Vec<_> = args.files.iter().map(|file| (file, check(file))).collect();
+    let results: Vec<_> = args.files.iter().flat_map(|file| check_all(file)).collect();
     for (file, result) in &results {
         match result {
             _ if common.json => {}
@@ -45,6 +45,29 @@ fn wrong(file: &Path, error: &anyhow::Error) -> String {
     words.strip_prefix(&prefix).map_or_else(|| words.clone(), str::to_owned)
 }
 
+/// Checks a file or, in a folder, its rig files: each by itself and against the others, as a service would serve them.
+fn check_all(path: &Path) -> Vec<(PathBuf, anyhow::Result<String>)> {
+    if !path.is_dir() {
+        return vec![(path.to_owned(), check(path))];
+    }
+    let rigs = match config::files_in_folder(path).and_then(Rigs::load) {
+        Ok(rigs) => rigs,
+        Err(ConfigError::AllRefused { refused }) => {
+            Rigs { served: Vec::new(), refused, files: Vec::new(), are_several: true }
+        }
+        Err(error) => return vec![(path.to_owned(), Err(error.into()))],
+    };
+    let served = rigs.served.into_iter().map(|files| (files.path, Ok(rig_in_words(&files.rig))));
+    let refused = rigs.refused.into_iter().map(|rig| (rig.path, Err(anyhow!(rig.problem))));
+    let mut results: Vec<_> = served.chain(refused).collect();
+    results.sort_by(|(one, _), (other, _)| one.cmp(other));
+    results
+}
+
+fn rig_in_words(rig: &Rig) -> String {
+    format!("rig {:?}, {} x {} elements", rig.name, rig.array.rows(), rig.array.cols())
+}
+
 /// Describes a valid file.
 ///
 /// # Errors
@@ -66,10 +89,7 @@ fn check(file: &Path) -> anyhow::Result<String> {
 fn check_toml(file: &Path) -> anyhow::Result<String> {
     let text = std::fs::read_to_string(file).context("cannot be read")?;
     match schema(&text) {
-        Some(rig::SCHEMA) => {
-            let rig = config::load_rig(file)?.rig;
-            Ok(format!("rig {:?}, {} x {} elements", rig.name, rig.array.rows(), rig.array.cols()))
-        }
+        Some(rig::SCHEMA) => Ok(rig_in_words(&config::load_rig(file)?.rig)),
         Some(model::SCHEMA) => {
             let Model { base, effects } = Model::from_toml(&text)?;
             let (name, rows, cols) = (base.array.name(), base.array.rows(), base.array.cols());
@@ -92,7 +112,14 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
             declared::SCHEMA
         ),
         None => {
-            Ok(format!("a service's configuration for rig {:?}", ServiceConfig::load(file)?.rig.rig.name))
+            let Rigs { served, refused, .. } = ServiceConfig::load(file)?.rigs;
+            if !refused.is_empty() {
+                let refused: Vec<_> = refused.iter().map(ToString::to_string).collect();
+                bail!("{}", refused.join("\n"));
+            }
+            let names: Vec<_> = served.iter().map(|files| format!("{:?}", files.rig.name)).collect();
+            let rigs = if names.len() == 1 { "rig" } else { "rigs" };
+            Ok(format!("a service's configuration for {rigs} {}", names.join(", ")))
         }
     }
 }

@@ -1,0 +1,343 @@
+//! How many rigs one service carries: memory of a rig, processor time of a frame, and whether any frame is lost between the
+//! device, a subscriber and the recordings.
+//!
+//! The devices are virtual ones of this process, each behind a socket of its own on loopback, so that the service under test is
+//! the real program with its real drivers. Each rig has its sensor and its stage.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command as Program, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail, ensure};
+use prost::Message as _;
+use tactus_bus::{Client, Endpoint, Hold};
+use tactus_device::transport::Connect;
+use tactus_record::{Entry, Message};
+use tactus_runner::config::RigFiles;
+use tactus_runner::embedded::{Truth, simulated_rig};
+use tactus_schema::key::Command;
+use tactus_schema::pb;
+use tactus_virtual::VirtualRig;
+use tokio::io::copy_bidirectional;
+use tokio::net::TcpListener;
+use tokio::time::{sleep, timeout};
+use zenoh::Session;
+
+/// Rate of every sensor.
+const RATE_HZ: f64 = 30.0;
+/// Only a hang takes this long.
+const PATIENCE: Duration = Duration::from_mins(5);
+/// The experiment of every run: it reads for as long as the measurement lasts.
+const SCRIPT: &str = "def run(rig):\n    tare()\n    wait(3600.0)\n";
+
+/// What is measured.
+#[derive(Debug, Clone)]
+pub struct RigsTrial {
+    /// The program `tactusd`.
+    pub daemon: PathBuf,
+    /// Number of rigs.
+    pub rigs: usize,
+    /// Length of the measurement.
+    pub time: Duration,
+    /// Every rig has a run in progress, and so a recording.
+    pub is_recording: bool,
+    /// Processors of the service, as `taskset` writes them; all of them without.
+    pub cores: Option<String>,
+}
+
+/// What one service of so many rigs did and took.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigsMeasured {
+    /// Number of rigs.
+    pub rigs: usize,
+    /// Frames a second that reached the subscriber, of all rigs.
+    pub frames_per_s: f64,
+    /// Sequence numbers that the subscriber did not see, from the first to the last of each rig.
+    pub missed: u64,
+    /// Frames that the recordings lack in the same way; `None` without recordings.
+    pub unrecorded: Option<u64>,
+    /// Processor time of the service for a frame, in microseconds.
+    pub frame_us: f64,
+    /// Share of one processor that the service took.
+    pub cores: f64,
+    /// Memory of the service that is its own (`RssAnon`), in KiB.
+    pub memory_kib: u64,
+    /// Threads of the service.
+    pub threads: u64,
+}
+
+/// The sequence numbers that came from one rig.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    first: u64,
+    last: u64,
+    count: u64,
+}
+
+/// The service under test; it ends with this.
+struct Service {
+    child: Child,
+    endpoint: Endpoint,
+    /// Rig files, configuration, recordings and log.
+    folder: tempfile::TempDir,
+}
+
+impl RigsTrial {
+    /// Starts devices and service, measures, and ends both.
+    ///
+    /// # Errors
+    /// If the service does not start, or a rig does not get ready.
+    pub fn measure(&self) -> Result<RigsMeasured> {
+        let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+        let measured = runtime.block_on(self.run());
+        runtime.shutdown_background();
+        measured
+    }
+
+    async fn run(&self) -> Result<RigsMeasured> {
+        let folder = tempfile::tempdir()?;
+        let names: Vec<_> = (0..self.rigs).map(|number| format!("r{number:05}")).collect();
+        let RigFiles { rig, codec, texts, .. } = simulated_rig()?;
+        fs::create_dir(folder.path().join("rigs"))?;
+        for (number, name) in (0_u64..).zip(&names) {
+            let mut devices = VirtualRig::of(Truth::of_rig(&rig, number), rig.covering, &codec);
+            let sensor = serve(devices.sensor_connector()).await?;
+            let stage = serve(devices.stage_connector()).await?;
+            // They live as long as this process.
+            std::mem::forget(devices);
+            let text = texts.rig_toml.replace("name = \"sim\"", &format!("name = \"{name}\""));
+            let text = at(&at(&text, &sensor), &stage);
+            fs::write(folder.path().join("rigs").join(format!("{name}.toml")), text)?;
+        }
+        let mut service = self.start(folder)?;
+        let session = session(&service.endpoint).await?;
+        all_ready(&session, &names, &mut service).await?;
+        if self.is_recording {
+            for name in &names {
+                start_run(&service.endpoint, name).await.with_context(|| format!("rig {name}"))?;
+            }
+        }
+        let (seen, is_counting) =
+            (Arc::<Mutex<BTreeMap<String, Seen>>>::default(), Arc::new(AtomicBool::new(false)));
+        let _subscriber = session
+            .declare_subscriber("tactus/*/sensor/frame$*")
+            .callback({
+                let (seen, is_counting) = (Arc::clone(&seen), Arc::clone(&is_counting));
+                move |sample| {
+                    if is_counting.load(Ordering::Relaxed) {
+                        count(&seen, sample.key_expr().as_str(), &sample.payload().to_bytes());
+                    }
+                }
+            })
+            .await
+            .map_err(|error| anyhow::anyhow!("{error}"))?;
+        // Histories and caches fill up first.
+        sleep(self.time / 2).await;
+        let pid = service.child.id();
+        let (began, before) = (Instant::now(), processor_s(pid)?);
+        is_counting.store(true, Ordering::Relaxed);
+        sleep(self.time).await;
+        is_counting.store(false, Ordering::Relaxed);
+        let (seconds, spent_s) = (began.elapsed().as_secs_f64(), processor_s(pid)? - before);
+        let (memory_kib, threads) = (status(pid, "RssAnon:")?, status(pid, "Threads:")?);
+        service.end()?;
+        let seen = seen.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        ensure!(seen.len() == self.rigs, "frames of {} of {} rigs came", seen.len(), self.rigs);
+        let frames: u64 = seen.values().map(|of| of.count).sum();
+        let unrecorded = self.is_recording.then(|| unrecorded(service.folder.path(), &seen)).transpose()?;
+        Ok(RigsMeasured {
+            rigs: self.rigs,
+            frames_per_s: frames as f64 / seconds,
+            missed: seen.values().map(|of| of.last + 1 - of.first - of.count).sum(),
+            unrecorded,
+            frame_us: spent_s * 1e6 / frames as f64,
+            cores: spent_s / seconds,
+            memory_kib,
+            threads,
+        })
+    }
+
+    fn start(&self, folder: tempfile::TempDir) -> Result<Service> {
+        let port = std::net::TcpListener::bind("127.0.0.1:0")?.local_addr()?.port();
+        let endpoint = format!("tcp/127.0.0.1:{port}");
+        let config = format!(
+            "rigs = \"rigs\"\nrecordings = \"runs\"\n[bus]\nlisten = [\"{endpoint}\"]\n[log]\nfilter = \"error\"\n"
+        );
+        let path = folder.path().join("tactusd.toml");
+        fs::write(&path, config)?;
+        let mut program = match &self.cores {
+            Some(cores) => {
+                let mut pinned = Program::new("taskset");
+                pinned.args(["--cpu-list", cores]).arg(&self.daemon);
+                pinned
+            }
+            None => Program::new(&self.daemon),
+        };
+        let child = program
+            .arg("--config")
+            .arg(&path)
+            .current_dir(folder.path())
+            // As its unit does.
+            .env("MALLOC_ARENA_MAX", "2")
+            .stdin(Stdio::null())
+            .stderr(fs::File::create(folder.path().join("log"))?)
+            .spawn()
+            .with_context(|| format!("{} does not start", self.daemon.display()))?;
+        Ok(Service { child, endpoint: endpoint.parse()?, folder })
+    }
+}
+
+impl RigsMeasured {
+    /// True if no frame was lost and the rate was kept.
+    pub fn is_whole(&self) -> bool {
+        let wanted = RATE_HZ * self.rigs as f64;
+        self.missed == 0 && self.unrecorded.is_none_or(|lost| lost == 0) && self.frames_per_s > 0.98 * wanted
+    }
+}
+
+impl Service {
+    /// Asks it to end, and waits for that.
+    fn end(&mut self) -> Result<()> {
+        let pid = i32::try_from(self.child.id()).ok().and_then(rustix::process::Pid::from_raw);
+        rustix::process::kill_process(pid.context("a process id")?, rustix::process::Signal::TERM)?;
+        self.child.wait()?;
+        Ok(())
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        // It may have ended already.
+        if self.child.kill().is_ok() {
+            drop(self.child.wait());
+        }
+    }
+}
+
+/// Serves a virtual device at a port of its own; returns its address.
+async fn serve(device: Box<dyn Connect>) -> Result<String> {
+    let listener = TcpListener::bind("127.0.0.1:0").await?;
+    let address = listener.local_addr()?.to_string();
+    tokio::spawn(async move {
+        while let Ok((mut host, _)) = listener.accept().await {
+            let Ok(mut line) = device.connect().await else { return };
+            // Either side may hang up.
+            drop(copy_bidirectional(&mut host, &mut line).await);
+        }
+    });
+    Ok(address)
+}
+
+/// The rig file with its first embedded device at an address.
+fn at(rig: &str, address: &str) -> String {
+    rig.replacen("{ kind = \"embedded\" }", &format!("{{ kind = \"tcp\", address = \"{address}\" }}"), 1)
+}
+
+/// A plain client of the bus.
+async fn session(endpoint: &Endpoint) -> Result<Session> {
+    let mut config = zenoh::Config::default();
+    for (name, value) in [
+        ("mode", "\"client\"".to_owned()),
+        ("scouting/multicast/enabled", "false".to_owned()),
+        ("connect/endpoints", format!("[\"{endpoint}\"]")),
+        // The service may still start.
+        ("connect/timeout_ms", "60000".to_owned()),
+        ("connect/exit_on_failure", "false".to_owned()),
+    ] {
+        config.insert_json5(name, &value).map_err(|error| anyhow::anyhow!("{name}: {error}"))?;
+    }
+    zenoh::open(config).await.map_err(|error| anyhow::anyhow!("no service at {endpoint}: {error}"))
+}
+
+/// Waits until every rig has said that its frames flow.
+async fn all_ready(session: &Session, names: &[String], service: &mut Service) -> Result<()> {
+    let tokens = session.liveliness().declare_subscriber("tactus/*/alive").history(true).await;
+    let tokens = tokens.map_err(|error| anyhow::anyhow!("{error}"))?;
+    let mut ready = std::collections::BTreeSet::new();
+    while ready.len() < names.len() {
+        let Ok(token) = timeout(PATIENCE, tokens.recv_async()).await else {
+            let log = fs::read_to_string(service.folder.path().join("log")).unwrap_or_default();
+            bail!(
+                "{} of {} rigs are ready after {PATIENCE:?}; the service's log:\n{log}",
+                ready.len(),
+                names.len()
+            );
+        };
+        ready.insert(token.map_err(|error| anyhow::anyhow!("{error}"))?.key_expr().to_string());
+        ensure!(service.child.try_wait()?.is_none(), "the service has ended");
+    }
+    Ok(())
+}
+
+/// Resets a rig and starts a run on it.
+async fn start_run(endpoint: &Endpoint, rig: &str) -> Result<()> {
+    let client = Client::connect(endpoint, Some(rig)).await?;
+    let held = match client.hold("bench", None).await? {
+        Hold::Held(held) => held,
+        Hold::Refused(reply) => bail!(reply.error),
+    };
+    let (who, lease) = ("bench".to_owned(), held.secret());
+    let request = pb::CommandRequest { who: who.clone(), lease: lease.clone(), ..Default::default() };
+    let reply = client.command(Command::Reset, &request, PATIENCE).await?;
+    ensure!(reply.ok, "{}", reply.error);
+    let request = pb::RunRequest {
+        experiment: "reads".into(),
+        script: SCRIPT.into(),
+        who,
+        lease,
+        ..Default::default()
+    };
+    let reply = client.command(Command::Run, &request, PATIENCE).await?;
+    ensure!(reply.ok, "{}", reply.error);
+    held.release().await?;
+    client.close().await?;
+    Ok(())
+}
+
+/// Counts a frame that reached the subscriber.
+fn count(seen: &Mutex<BTreeMap<String, Seen>>, key: &str, payload: &[u8]) {
+    let (Some(rig), Ok(frame)) = (key.split('/').nth(1), pb::Frame::decode(payload)) else { return };
+    let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
+    let of = seen.entry(rig.to_owned()).or_insert(Seen { first: frame.seq, last: frame.seq, count: 0 });
+    of.last = frame.seq;
+    of.count += 1;
+}
+
+/// Frames that the subscriber could have seen and that are in no recording.
+fn unrecorded(folder: &Path, seen: &BTreeMap<String, Seen>) -> Result<u64> {
+    let mut missing = 0;
+    for (rig, of) in seen {
+        let mut runs = fs::read_dir(folder.join("runs").join(rig))?;
+        let run = runs.next().with_context(|| format!("rig {rig} has no recording"))??;
+        let mut recorded = 0;
+        for entry in tactus_record::read(run.path().join("recording.mcap"))? {
+            if let Entry::Message { message: Message::Frame(frame), .. } = entry? {
+                recorded += u64::from((of.first..=of.last).contains(&frame.seq));
+            }
+        }
+        missing += of.last + 1 - of.first - recorded;
+    }
+    Ok(missing)
+}
+
+/// Processor time that a process has spent, in s.
+fn processor_s(pid: u32) -> Result<f64> {
+    /// Of the kernel's clock for processes, on every Linux.
+    const TICKS_PER_S: f64 = 100.0;
+    let stat = fs::read_to_string(format!("/proc/{pid}/stat"))?;
+    let (_, fields) = stat.rsplit_once(')').context("a process's state")?;
+    let ticks: u64 =
+        fields.split_whitespace().skip(11).take(2).filter_map(|field| field.parse::<u64>().ok()).sum();
+    Ok(ticks as f64 / TICKS_PER_S)
+}
+
+/// A number of `/proc/PID/status`.
+fn status(pid: u32, name: &str) -> Result<u64> {
+    let status = fs::read_to_string(format!("/proc/{pid}/status"))?;
+    let line = status.lines().find_map(|line| line.strip_prefix(name)).with_context(|| name.to_owned())?;
+    Ok(line.split_whitespace().next().context("a number")?.parse()?)
+}

@@ -1,0 +1,167 @@
+//! The way of a rig's messages to the bus: each rig has a queue for each lane, and a lane has one thread that takes from all queues.
+//!
+//! A queue with messages calls the thread, once until the thread has come to it. Rigs therefore share no lock: whoever
+//! publishes touches only the rig's own queue and a channel that nobody waits for.
+
+use std::{
+    io,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::{self, JoinHandle},
+};
+
+use tokio::sync::{Notify, mpsc};
+
+use crate::{
+    publisher::{Outgoing, TopicPublishers},
+    queue::Queue,
+    topic::Lane,
+};
+
+/// Bytes that wait in each outgoing queue at most.
+const WAITING_BYTES_MAX: usize = 16 << 20;
+/// Messages of one rig that are sent before it is the next one's turn.
+const AT_ONCE: usize = 64;
+
+/// A rig's outgoing queues.
+#[derive(Debug)]
+pub(crate) struct Outlets {
+    pub(crate) frames: Arc<Outlet>,
+    pub(crate) updates: Arc<Outlet>,
+}
+
+/// An outgoing queue of one rig, with the publishers of its messages.
+#[derive(Debug)]
+pub(crate) struct Outlet {
+    queue: Queue<Outgoing>,
+    publishers: TopicPublishers,
+    /// The thread has been called and has not come yet.
+    is_called: AtomicBool,
+    caller: Caller,
+    /// The queue is closed, and its last message was sent.
+    finished: Notify,
+}
+
+/// Calls the thread of a lane.
+#[derive(Debug, Clone)]
+pub(crate) struct Caller(mpsc::UnboundedSender<Call>);
+
+#[derive(Debug)]
+enum Call {
+    /// This outlet has something to send.
+    Outlet(Arc<Outlet>),
+    /// Nothing follows.
+    End,
+}
+
+/// The thread of a lane: it passes messages to zenoh, and may wait there for slow clients.
+#[derive(Debug)]
+pub(crate) struct Carrier {
+    caller: Caller,
+    thread: JoinHandle<()>,
+}
+
+impl Outlets {
+    pub(crate) fn of(&self, lane: Lane) -> &Arc<Outlet> {
+        match lane {
+            Lane::Frames => &self.frames,
+            Lane::Updates => &self.updates,
+        }
+    }
+}
+
+impl Outlet {
+    pub(crate) fn new(lane: Lane, publishers: TopicPublishers, caller: Caller) -> Arc<Self> {
+        // Drop-oldest, counted.
+        let capacity = match lane {
+            // 10 s.
+            Lane::Frames => 300,
+            // Far more than a run sends while stalled clients cost a millisecond per message each.
+            Lane::Updates => 8_192,
+        };
+        let queue = Queue::bounded(capacity, WAITING_BYTES_MAX, |message: &Outgoing| message.payload.len());
+        let (is_called, finished) = (AtomicBool::new(false), Notify::new());
+        Arc::new(Self { queue, publishers, is_called, caller, finished })
+    }
+
+    /// Appends a message; returns the one that gave way to it, if the queue is full.
+    pub(crate) fn push(self: &Arc<Self>, message: Outgoing) -> Option<Outgoing> {
+        let displaced = self.queue.push(message);
+        self.call();
+        displaced
+    }
+
+    /// Messages that gave way to newer ones.
+    pub(crate) fn dropped(&self) -> u64 {
+        self.queue.dropped()
+    }
+
+    /// Refuses further messages, and returns once those inside are sent.
+    pub(crate) async fn finish(self: &Arc<Self>) {
+        self.queue.close();
+        self.call();
+        self.finished.notified().await;
+    }
+
+    fn call(self: &Arc<Self>) {
+        if !self.is_called.swap(true, Ordering::AcqRel) {
+            self.caller.call(Call::Outlet(Arc::clone(self)));
+        }
+    }
+
+    /// Sends what waits, but no more than is one rig's turn.
+    fn send(self: &Arc<Self>) {
+        // Before the queue is looked at: a message that comes later calls again.
+        self.is_called.store(false, Ordering::Release);
+        for _ in 0..AT_ONCE {
+            let Some(message) = self.queue.try_pop() else {
+                if self.queue.is_finished() {
+                    self.finished.notify_one();
+                }
+                return;
+            };
+            self.publishers.publish(message);
+        }
+        self.call();
+    }
+}
+
+impl Caller {
+    fn call(&self, call: Call) {
+        if self.0.send(call).is_err() {
+            tracing::debug!("a message after the end of the bus");
+        }
+    }
+}
+
+impl Carrier {
+    pub(crate) fn start(lane: Lane) -> io::Result<Self> {
+        // Bounded by the number of rigs: each outlet is in it at most once.
+        let (caller, mut calls) = mpsc::unbounded_channel();
+        let name = match lane {
+            Lane::Frames => "bus-frames",
+            Lane::Updates => "bus-updates",
+        };
+        let thread = thread::Builder::new().name(name.to_owned()).spawn(move || {
+            while let Some(Call::Outlet(outlet)) = calls.blocking_recv() {
+                outlet.send();
+            }
+        })?;
+        Ok(Self { caller: Caller(caller), thread })
+    }
+
+    pub(crate) fn caller(&self) -> Caller {
+        self.caller.clone()
+    }
+
+    /// Returns once everything before is sent.
+    pub(crate) async fn finish(self) {
+        self.caller.call(Call::End);
+        let joined = tokio::task::spawn_blocking(|| self.thread.join()).await;
+        if !matches!(joined, Ok(Ok(()))) {
+            tracing::error!("a thread of the bus panicked");
+        }
+    }
+}

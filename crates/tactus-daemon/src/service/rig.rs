@@ -1,0 +1,304 @@
+//! One rig of the service: its engine and its commands, from its file until the service ends. Whatever fails in it ends here: the
+//! rig is then off, says why, and is started again.
+
+use std::fs;
+use std::panic::AssertUnwindSafe;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+
+use futures_util::FutureExt;
+use tactus_bus::{Bus, BusError, CommandCall, Node};
+use tactus_device::Clock;
+use tactus_engine::{Engine, EngineError, StopOrder};
+use tactus_runner::config::{RigFiles, Rigs, ServiceConfig};
+use tactus_runner::covering_file::CoveringFile;
+use tactus_runner::embedded::Truth;
+use tactus_runner::{crashed, devices};
+use tactus_schema::key::{Command, Keys};
+use tactus_schema::pb;
+use tokio::sync::{mpsc, watch};
+use tokio::time::{interval, sleep, timeout};
+use tracing::{error, info, warn};
+
+use super::commands::{CommandDesk, Places};
+use super::health;
+use super::publish::BusPublisher;
+use super::standing::{Standing, Standings};
+use super::stops::Desks;
+use crate::inhibitor::Runs;
+
+/// Time until a rig that failed is started again.
+const AGAIN: Duration = Duration::from_secs(5);
+
+/// Time for a run to retract and close its recording.
+const CLOSING_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// What the rigs of a service share. No frame touches it.
+pub(super) struct Service {
+    pub(super) config: ServiceConfig,
+    pub(super) desks: Desks,
+    pub(super) standings: Standings,
+    pub(super) runs: Runs,
+    /// Why the service ends, once it does.
+    pub(super) ending: watch::Receiver<Option<&'static str>>,
+}
+
+/// One rig, as the configuration has it.
+pub(super) struct Rig {
+    pub(super) name: Arc<str>,
+    /// What is known of it.
+    pub(super) state: State,
+    pub(super) bus: Bus,
+    pub(super) commands: mpsc::Receiver<CommandCall>,
+}
+
+/// Whether a rig can be started.
+pub(super) enum State {
+    /// Its files could be read.
+    Known(Box<RigFiles>),
+    /// They could not, or contradict those of others.
+    Refused { files: Vec<PathBuf>, problem: String },
+}
+
+/// Why a rig does not work.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Failure {
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    #[error("a task of it broke off: this is a defect of Tactus, see the log")]
+    Panic,
+    #[error("the run did not close within {CLOSING_TIMEOUT:?}: its recording may lack its end")]
+    Hung,
+}
+
+/// Puts every rig of the configuration on the bus. Nothing has been opened yet.
+///
+/// # Errors
+/// If the bus refuses one.
+pub(super) async fn all(node: &Arc<Node>, config: &ServiceConfig) -> Result<Vec<Rig>, BusError> {
+    let known = config
+        .rigs
+        .served
+        .iter()
+        .map(|files| (Arc::from(&*files.rig.name), State::Known(Box::new(files.clone()))));
+    let mut rigs: Vec<(Arc<str>, State)> = known.collect();
+    for refused in &config.rigs.refused {
+        let same = rigs.iter_mut().find(|(name, _)| **name == *refused.name);
+        match same.map(|(_, state)| state) {
+            // Its problem names this file, too.
+            Some(State::Refused { files, .. }) => files.push(refused.path.clone()),
+            Some(State::Known(_)) => {}
+            None => {
+                let (files, problem) = (vec![refused.path.clone()], refused.problem.clone());
+                rigs.push((Arc::from(&*refused.name), State::Refused { files, problem }));
+            }
+        }
+    }
+    let mut all = Vec::new();
+    for (name, state) in rigs {
+        let (bus, mut commands) = node.serve(Keys::new(&*name)).await?;
+        if all.is_empty() {
+            // The rules of all rigs have one form.
+            node.check_denials(&bus, &mut commands).await?;
+        }
+        all.push(Rig { name, state, bus, commands });
+    }
+    Ok(all)
+}
+
+impl Rig {
+    /// Keeps the rig up until the service ends.
+    ///
+    /// # Errors
+    /// If the run in progress could not be closed, or the bus did not close.
+    pub(super) async fn keep(mut self, service: Arc<Service>) -> Result<(), RigError> {
+        let mut ended = Ok(());
+        while service.ending.borrow().is_none() {
+            let problem = match &self.state {
+                State::Known(files) => {
+                    let files = files.clone();
+                    match self.attend(*files, &service).await {
+                        Ok(()) => break,
+                        Err(Failure::Hung) => {
+                            ended = Err(RigError::Hung { rig: self.name.to_string() });
+                            break;
+                        }
+                        // The service is this rig: who started it starts it again.
+                        Err(failure) if !service.config.rigs.are_several => {
+                            ended = Err(RigError::Failed(failure));
+                            break;
+                        }
+                        Err(failure) => failure.to_string(),
+                    }
+                }
+                State::Refused { problem, .. } => problem.clone(),
+            };
+            self.stay_off(&problem, &service).await;
+        }
+        service.standings.set(&self.name, Standing::Off("the service ends".into()));
+        Ok(self.bus.close().await.and(Ok(()))?).and(ended)
+    }
+
+    /// Acquires frames and answers commands until the service ends.
+    async fn attend(&mut self, files: RigFiles, service: &Service) -> Result<(), Failure> {
+        service.standings.set(&self.name, Standing::Starts);
+        let recordings = service.config.recordings_of(&self.name);
+        let closing = {
+            let recordings = recordings.clone();
+            tokio::task::spawn_blocking(move || crashed::close_all(&recordings))
+        };
+        let RigFiles { rig, codec, texts, .. } = files;
+        let clock = Clock::real();
+        let Some(rig_service) = rig.service.clone() else {
+            return Err(EngineError::NoService { rig: rig.name }.into());
+        };
+        let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
+        let mut opened = devices::open(&rig, &rig_service, codec, truth, clock);
+        if opened.devices.change_covering.is_none() {
+            // A person changes the covering, and may do so while the service is down.
+            opened.devices.covering_memory = Some(Arc::new(CoveringFile::of(&rig.name, &recordings)));
+        }
+        let publisher = self.bus.publisher();
+        let engine = Engine::start(rig, opened.devices, clock, Arc::new(BusPublisher(publisher.clone())))?;
+        let places = Places { texts, recordings, experiments: service.config.experiments.clone() };
+        let desk = Arc::new(CommandDesk::new(engine.clone(), places, publisher.clone()));
+        service.desks.add(&self.name, &desk);
+
+        let (bus, commands, name) = (&self.bus, &mut self.commands, &self.name);
+        let ready = async {
+            frames_flow(&engine).await;
+            if closing.await.is_err() {
+                error!("the recordings were not checked for crashed runs: this is a defect of Tactus");
+            }
+            let alive = bus.declare_alive().await?;
+            service.standings.set(name, Standing::Flows);
+            info!("ready: frames flow");
+            broken_off(&engine).await;
+            drop(alive);
+            Err::<(), _>(Failure::Panic)
+        };
+        let mut ending = service.ending.clone();
+        let serving = async {
+            tokio::select! {
+                biased;
+                why = ending.wait_for(Option::is_some) => {
+                    let why = why.ok().and_then(|why| *why);
+                    Ok(why.unwrap_or("the service has ended"))
+                }
+                broken = ready => Err(broken.err().unwrap_or(Failure::Panic)),
+                () = desk.answer_commands(commands) => Ok("the bus has closed"),
+                () = health::publish(&desk, &publisher) => Err(Failure::Panic),
+                () = service.runs.count(&engine) => Err(Failure::Panic),
+            }
+        };
+        // A panic of one of these is this rig's alone.
+        let served = AssertUnwindSafe(serving).catch_unwind().await.unwrap_or(Err(Failure::Panic));
+        let why = match &served {
+            Ok(why) => format!("{why}: the service closes down"),
+            Err(failure) => failure.to_string(),
+        };
+        let closed = end_run(&engine, why).await;
+        service.desks.remove(&self.name);
+        closed.and(served.map(drop))
+    }
+
+    /// Says why the rig does not work until it is time to start it again, or the service ends.
+    async fn stay_off(&mut self, problem: &str, service: &Service) {
+        error!("{problem}");
+        service.standings.set(&self.name, Standing::Off(problem.to_owned()));
+        let (clock, publisher) = (Clock::real(), self.bus.publisher());
+        let (name, commands) = (&self.name, &mut self.commands);
+        let mut tick = interval(health::PERIOD);
+        let mut ending = service.ending.clone();
+        let again = wait_again(&mut self.state, name, service);
+        tokio::pin!(again);
+        loop {
+            tokio::select! {
+                biased;
+                _ = ending.wait_for(Option::is_some) => return,
+                () = &mut again => return,
+                Some(call) = commands.recv() => {
+                    let reply = refusal(name, problem, call.command, clock);
+                    call.reply.reply(reply);
+                }
+                _ = tick.tick() => publisher.publish(&health::of_missing(problem, clock.now())),
+            }
+        }
+    }
+}
+
+/// Why a rig did not end well.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum RigError {
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    #[error(transparent)]
+    Failed(Failure),
+    #[error("rig {rig:?}: the run did not close within {CLOSING_TIMEOUT:?}: its recording may lack its end")]
+    Hung { rig: String },
+}
+
+/// Waits until the rig can be tried again: a while or, if its files are wrong, until one of them has changed and is right.
+async fn wait_again(state: &mut State, name: &str, service: &Service) {
+    let State::Refused { files, .. } = state else {
+        return sleep(AGAIN).await;
+    };
+    let changed = |files: &[PathBuf]| -> Vec<Option<SystemTime>> {
+        files.iter().map(|file| fs::metadata(file).and_then(|found| found.modified()).ok()).collect()
+    };
+    let mut seen = changed(files);
+    loop {
+        sleep(AGAIN).await;
+        let now = changed(files);
+        if std::mem::replace(&mut seen, now.clone()) == now {
+            continue;
+        }
+        let all = service.config.rigs.files.clone();
+        let Ok(Ok(rigs)) = tokio::task::spawn_blocking(|| Rigs::load(all)).await else { continue };
+        if let Some(files) = rigs.served.into_iter().find(|files| files.rig.name == name) {
+            *state = State::Known(Box::new(files));
+            return;
+        }
+        for refused in rigs.refused.iter().filter(|refused| refused.name == name) {
+            warn!("{}", refused.problem);
+        }
+    }
+}
+
+/// The answer of a rig that is off.
+fn refusal(rig: &str, problem: &str, command: Command, clock: Clock) -> pb::CommandReply {
+    let is_question = command == Command::Status;
+    pb::CommandReply {
+        ok: is_question,
+        error: if is_question { String::new() } else { format!("rig {rig:?} is off: {problem}") },
+        exit_code: u32::from(!is_question),
+        rig: rig.to_owned(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        health: Some(health::of_missing(problem, clock.now())),
+        ..Default::default()
+    }
+}
+
+async fn frames_flow(engine: &Engine) {
+    let mut pulse = engine.pulse();
+    if pulse.wait_for(|pulse| pulse.sensor_connected && pulse.frames > 1).await.is_err() {
+        std::future::pending::<()>().await;
+    }
+}
+
+/// Returns once nobody reads the sensor any more, and no run needs the stage.
+async fn broken_off(engine: &Engine) {
+    let mut pulse = engine.pulse();
+    // Without a sender the acquisition is gone, too.
+    let _gone = pulse.wait_for(|pulse| pulse.sensor_broke_off).await.is_err();
+    engine.released().await;
+}
+
+/// Ends the run in progress: stop, retract, close the recording.
+async fn end_run(engine: &Engine, reason: String) -> Result<(), Failure> {
+    engine.stop(StopOrder { by: "signal".into(), reason, abort: false });
+    timeout(CLOSING_TIMEOUT, engine.released()).await.map_err(|_| Failure::Hung)
+}
