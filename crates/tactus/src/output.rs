@@ -13,7 +13,9 @@ pub(crate) fn print_fields(fields: &[(&str, String)]) {
 
 /// Prints a table with a header, columns aligned to their widest cell.
 pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
-    table(header, rows).iter().for_each(|line| say(line));
+    for line in table(header, rows) {
+        say(&line);
+    }
 }
 
 /// As [`print_table`], with lines that end at the edge of the terminal: the last column gives way.
@@ -21,7 +23,9 @@ pub(crate) fn print_table_cut(header: &[&str], rows: &[Vec<String>]) {
     let is_terminal = std::io::stdout().is_terminal();
     let size = is_terminal.then(|| ratatui::crossterm::terminal::size().ok()).flatten();
     let width = size.map_or(usize::MAX, |(columns, _)| usize::from(columns).max(1));
-    table(header, rows).iter().for_each(|line| say(&cut(line, width)));
+    for line in table(header, rows) {
+        say(&cut(&line, width));
+    }
 }
 
 /// A line of at most so many characters; an ellipsis says that something is missing.

@@ -1,4 +1,4 @@
-use super::duration;
+use super::{cut, duration, table};
 
 #[test]
 fn durations_are_in_words_without_sixty_seconds() {

@@ -108,7 +108,8 @@ class Health(Message):
     clock_uncertainty_s: float
     simulated: bool
     lease_holder: str
-    def __init__(self, *, t_mono_ns: int | None = ..., t_wall_ns: int | None = ..., version: str | None = ..., uptime_s: float | None = ..., sensor_connected: bool | None = ..., stage_connected: bool | None = ..., frames: int | None = ..., frames_lost: int | None = ..., frames_dropped_on_bus: int | None = ..., frame_rate_hz: float | None = ..., clock_offset_s: float | None = ..., clock_uncertainty_s: float | None = ..., simulated: bool | None = ..., lease_holder: str | None = ...) -> None: ...
+    problem: str
+    def __init__(self, *, t_mono_ns: int | None = ..., t_wall_ns: int | None = ..., version: str | None = ..., uptime_s: float | None = ..., sensor_connected: bool | None = ..., stage_connected: bool | None = ..., frames: int | None = ..., frames_lost: int | None = ..., frames_dropped_on_bus: int | None = ..., frame_rate_hz: float | None = ..., clock_offset_s: float | None = ..., clock_uncertainty_s: float | None = ..., simulated: bool | None = ..., lease_holder: str | None = ..., problem: str | None = ...) -> None: ...
 
 class Lease(Message):
     holder: str
