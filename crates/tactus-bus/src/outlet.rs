@@ -6,7 +6,7 @@
 use std::{
     io,
     sync::{
-        Arc,
+        Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
     thread::{self, JoinHandle},
@@ -36,7 +36,8 @@ pub(crate) struct Outlets {
 #[derive(Debug)]
 pub(crate) struct Outlet {
     queue: Queue<Outgoing>,
-    publishers: TopicPublishers,
+    /// The thread's alone; `None` once all is sent, so that nothing of zenoh outlives the session.
+    publishers: Mutex<Option<TopicPublishers>>,
     /// The thread has been called and has not come yet.
     is_called: AtomicBool,
     caller: Caller,
@@ -82,6 +83,7 @@ impl Outlet {
             Lane::Updates => 8_192,
         };
         let queue = Queue::bounded(capacity, WAITING_BYTES_MAX, |message: &Outgoing| message.payload.len());
+        let publishers = Mutex::new(Some(publishers));
         let (is_called, finished) = (AtomicBool::new(false), Notify::new());
         Arc::new(Self { queue, publishers, is_called, caller, finished })
     }
@@ -115,14 +117,18 @@ impl Outlet {
     fn send(self: &Arc<Self>) {
         // Before the queue is looked at: a message that comes later calls again.
         self.is_called.store(false, Ordering::Release);
+        let mut publishers = self.publishers.lock().unwrap_or_else(PoisonError::into_inner);
         for _ in 0..AT_ONCE {
             let Some(message) = self.queue.try_pop() else {
                 if self.queue.is_finished() {
+                    *publishers = None;
                     self.finished.notify_one();
                 }
                 return;
             };
-            self.publishers.publish(message);
+            if let Some(publishers) = &*publishers {
+                publishers.publish(message);
+            }
         }
         self.call();
     }

@@ -97,7 +97,12 @@ pub(crate) async fn feed_watchdog(desks: RunningDesks, systemd: Systemd) {
     loop {
         tick.tick().await;
         let desks = desks.of(None);
-        watched.retain(|rig, of| desks.iter().any(|(name, desk)| name == rig && Arc::ptr_eq(desk, &of.desk)));
+        // They are sorted. One that was started again is another desk.
+        let is_there = |rig: &Arc<str>, of: &WatchedRig| {
+            let at = desks.binary_search_by(|(name, _)| name.cmp(rig));
+            at.ok().and_then(|at| desks.get(at)).is_some_and(|(_, desk)| Arc::ptr_eq(desk, &of.desk))
+        };
+        watched.retain(|rig, of| is_there(rig, of));
         let (mut hanging, mut still_hanging) = (0, 0);
         for (rig, desk) in &desks {
             let watched = watched.entry(Arc::clone(rig)).or_insert_with(|| WatchedRig::new(desk, limit / 2));

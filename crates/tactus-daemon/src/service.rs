@@ -44,7 +44,7 @@ use tactus_runner::signals::EndingSignals;
 use tactus_schema::key::Keys;
 use tokio::runtime::Handle;
 use tokio::sync::watch;
-use tokio::task::JoinSet;
+use tokio::task::{JoinError, JoinSet};
 use tracing::{Instrument, Span, error, info, info_span};
 
 use crate::inhibitor::{self, Runs};
@@ -128,7 +128,7 @@ fn start(config: ServiceConfig) -> Result<(), ServiceError> {
     served
 }
 
-async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
+async fn serve(mut config: ServiceConfig) -> Result<(), ServiceError> {
     let system = |what| move |source| ServiceError::System { what, source };
     // Before a device is opened, so that no signal leaves the tip where it is.
     let mut signals = EndingSignals::listen().map_err(system("signals"))?;
@@ -145,7 +145,7 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     };
     let keys: Vec<_> = names.into_iter().map(Keys::new).collect();
     let (node, stops) = Node::open(&endpoints, &keys).await?;
-    let rigs = rig::all(&node, &config).await?;
+    let rigs = rig::all(&node, &mut config).await?;
     // The last rig closes it.
     drop(node);
 
@@ -182,30 +182,39 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
         keeping.spawn(rig.keep(Arc::clone(&service)).instrument(span));
     }
 
-    let (signalled, mut first) = tokio::select! {
-        biased;
-        ending = signals.next() => (ending.name, None),
-        kept = keeping.join_next() => ("a rig has ended", kept),
+    let mut closed = Ok(());
+    let signalled = loop {
+        tokio::select! {
+            biased;
+            ending = signals.next() => break ending.name,
+            kept = keeping.join_next() => match kept {
+                Some(kept) => closed = closed.and(end_of(kept)),
+                None => break "no rig is left",
+            },
+        }
     };
     info!("{signalled}: closing down");
     systemd.stopping();
     end.send_replace(Some(signalled));
-    let mut closed = Ok(());
-    while let Some(kept) = match first.take() {
-        None => keeping.join_next().await,
-        first => first,
-    } {
-        match kept {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => closed = Err(error.into()),
-            Err(panic) => error!(%panic, "the keeper of a rig broke off: this is a defect of Tactus"),
-        }
+    while let Some(kept) = keeping.join_next().await {
+        closed = closed.and(end_of(kept));
     }
     for task in tasks {
         task.abort();
     }
     info!("closed");
     closed
+}
+
+/// How a rig has ended.
+fn end_of(kept: Result<Result<(), RigError>, JoinError>) -> Result<(), ServiceError> {
+    match kept {
+        Ok(ended) => Ok(ended?),
+        Err(panic) => {
+            error!(%panic, "the keeper of a rig broke off: this is a defect of Tactus");
+            Ok(())
+        }
+    }
 }
 
 /// The names of all rigs, served or refused.

@@ -11,7 +11,7 @@ use std::time::Duration;
 use tactus_bus::{CommandCall, Publisher, Request};
 use tactus_engine::{Engine, ResetError, ResumeError, RunOrder, StopOrder};
 use tactus_plan::{Arguments, Evaluate, Script};
-use tactus_runner::config::RigTexts;
+use tactus_runner::config::RigFiles;
 use tactus_runner::continuation::{self, ContinuationError, Wish};
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::recorder::{Gauge, ThreadRecorder};
@@ -43,8 +43,8 @@ const RESUME_PATIENCE: Duration = Duration::from_secs(2);
 /// Where the runs of a rig come from and go to.
 #[derive(Debug, Clone)]
 pub(super) struct Places {
-    /// The texts of the rig's files, for recordings.
-    pub(super) texts: RigTexts,
+    /// The rig's files: their texts go into recordings.
+    pub(super) files: Arc<RigFiles>,
     /// Folder of its recordings.
     pub(super) recordings: PathBuf,
     /// Folder of experiment scripts.
@@ -182,7 +182,7 @@ impl CommandDesk {
                     });
                 }
                 (Command::Status, Request::Control(_)) => {
-                    let rig_toml = self.places.texts.rig_toml.clone();
+                    let rig_toml = self.places.files.texts.rig_toml.clone();
                     let description = describe(&self.engine.rig());
                     call.reply.reply(pb::CommandReply { rig_toml, description, ..self.reply(Ok(())) });
                 }
@@ -346,7 +346,7 @@ impl CommandDesk {
         // Somebody may have taken it over during the dry run.
         self.want_lease(&lease)?;
         order.planned = Some(plan.promise());
-        let texts = self.places.texts.all();
+        let texts = self.places.files.texts.all();
         let (recording, path) =
             order::recording(&order, &rig, texts, &self.places.recordings, now).map_err(Refusal::failed)?;
         let path = std::path::absolute(&path).unwrap_or(path);

@@ -32,14 +32,15 @@ fn answers_and_reports_of_the_stage_never_wait_for_each_other() {
 async fn lab(listen: Vec<Endpoint>) -> (Bus, Calls, CommandDesk) {
     let config = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/tactusd.toml"));
     let config = ServiceConfig::load(config).unwrap();
-    let RigFiles { rig, codec, texts, .. } = config.rigs.served[0].clone();
+    let files = Arc::new(config.rigs.served[0].clone());
+    let RigFiles { rig, codec, .. } = RigFiles::clone(&files);
     let bus_config = BusConfig { listen, ..BusConfig::default() };
     let (bus, calls) = Bus::open(&bus_config, Keys::new(rig.name.clone())).await.unwrap();
     let clock = Clock::real();
     let service = rig.service.clone().unwrap();
     let opened = devices::open(&rig, &service, codec, || Truth::of_rig(&rig, 1), clock);
     let engine = Engine::start(rig, opened.devices, clock, Arc::new(Unpublished)).unwrap();
-    let places = Places { texts, recordings: config.recordings, experiments: config.experiments };
+    let places = Places { files, recordings: config.recordings, experiments: config.experiments };
     let desk = CommandDesk::new(engine, places, bus.publisher());
     (bus, calls, desk)
 }

@@ -56,7 +56,7 @@ pub(super) struct Rig {
 /// Whether a rig can be started.
 pub(super) enum State {
     /// Its files could be read.
-    Known(Box<RigFiles>),
+    Known(Arc<RigFiles>),
     /// They could not, or contradict those of others.
     Refused { files: Vec<PathBuf>, problem: String },
 }
@@ -78,12 +78,10 @@ pub(super) enum Failure {
 ///
 /// # Errors
 /// If the bus refuses one.
-pub(super) async fn all(node: &Arc<Node>, config: &ServiceConfig) -> Result<Vec<Rig>, BusError> {
-    let known = config
-        .rigs
-        .served
-        .iter()
-        .map(|files| (Arc::from(&*files.rig.name), State::Known(Box::new(files.clone()))));
+pub(super) async fn all(node: &Arc<Node>, config: &mut ServiceConfig) -> Result<Vec<Rig>, BusError> {
+    // Each keeps its own files: with many rigs a second copy would count.
+    let known = std::mem::take(&mut config.rigs.served);
+    let known = known.into_iter().map(|files| (Arc::from(&*files.rig.name), State::Known(Arc::new(files))));
     let mut rigs: Vec<(Arc<str>, State)> = known.collect();
     for refused in &config.rigs.refused {
         let same = rigs.iter_mut().find(|(name, _)| **name == *refused.name);
@@ -113,44 +111,42 @@ impl Rig {
     /// Keeps the rig up until the service ends.
     ///
     /// # Errors
-    /// If the run in progress could not be closed, or the bus did not close.
+    /// If the run in progress could not be closed, or the bus did not close. The failure of the only rig of a service, too: who
+    /// started the service starts it again.
     pub(super) async fn keep(mut self, service: Arc<Service>) -> Result<(), RigError> {
         let mut ended = Ok(());
         while service.ending.borrow().is_none() {
             let problem = match &self.state {
                 State::Known(files) => {
-                    let files = files.clone();
-                    match self.attend(*files, &service).await {
+                    let files = Arc::clone(files);
+                    match self.attend(&files, &service).await {
                         Ok(()) => break,
-                        Err(Failure::Hung) => {
-                            ended = Err(RigError::Hung { rig: self.name.to_string() });
-                            break;
+                        Err(failure) => {
+                            if !service.config.rigs.are_several || service.ending.borrow().is_some() {
+                                ended = Err(RigError::Failed { rig: self.name.to_string(), failure });
+                                break;
+                            }
+                            failure.to_string()
                         }
-                        // The service is this rig: who started it starts it again.
-                        Err(failure) if !service.config.rigs.are_several => {
-                            ended = Err(RigError::Failed(failure));
-                            break;
-                        }
-                        Err(failure) => failure.to_string(),
                     }
                 }
                 State::Refused { problem, .. } => problem.clone(),
             };
             self.stay_off(&problem, &service).await;
         }
-        service.standings.set(&self.name, Standing::Off("the service ends".into()));
-        Ok(self.bus.close().await.and(Ok(()))?).and(ended)
+        self.bus.close().await?;
+        ended
     }
 
     /// Acquires frames and answers commands until the service ends.
-    async fn attend(&mut self, files: RigFiles, service: &Service) -> Result<(), Failure> {
+    async fn attend(&mut self, files: &Arc<RigFiles>, service: &Service) -> Result<(), Failure> {
         service.standings.set(&self.name, Standing::Starts);
         let recordings = service.config.recordings_of(&self.name);
         let closing = {
             let recordings = recordings.clone();
             tokio::task::spawn_blocking(move || crashed::close_all(&recordings))
         };
-        let RigFiles { rig, codec, texts, .. } = files;
+        let RigFiles { rig, codec, .. } = RigFiles::clone(files);
         let clock = Clock::real();
         let Some(rig_service) = rig.service.clone() else {
             return Err(EngineError::NoService { rig: rig.name }.into());
@@ -163,21 +159,22 @@ impl Rig {
         }
         let publisher = self.bus.publisher();
         let engine = Engine::start(rig, opened.devices, clock, Arc::new(BusPublisher(publisher.clone())))?;
-        let places = Places { texts, recordings, experiments: service.config.experiments.clone() };
+        let places =
+            Places { files: Arc::clone(files), recordings, experiments: service.config.experiments.clone() };
         let desk = Arc::new(CommandDesk::new(engine.clone(), places, publisher.clone()));
         service.desks.add(&self.name, &desk);
 
         let (bus, commands, name) = (&self.bus, &mut self.commands, &self.name);
+        let mut alive = None;
         let ready = async {
             frames_flow(&engine).await;
             if closing.await.is_err() {
                 error!("the recordings were not checked for crashed runs: this is a defect of Tactus");
             }
-            let alive = bus.declare_alive().await?;
+            alive = Some(bus.declare_alive().await?);
             service.standings.set(name, Standing::Flows);
             info!("ready: frames flow");
             broken_off(&engine).await;
-            drop(alive);
             Err::<(), _>(Failure::Panic)
         };
         let mut ending = service.ending.clone();
@@ -196,11 +193,12 @@ impl Rig {
         };
         // A panic of one of these is this rig's alone.
         let served = AssertUnwindSafe(serving).catch_unwind().await.unwrap_or(Err(Failure::Panic));
-        let why = match &served {
-            Ok(why) => format!("{why}: the service closes down"),
-            Err(failure) => failure.to_string(),
+        let (by, reason) = match &served {
+            Ok(why) => ("signal", format!("{why}: the service closes down")),
+            Err(failure) => ("service", failure.to_string()),
         };
-        let closed = end_run(&engine, why).await;
+        let closed = end_run(&engine, by, reason).await;
+        drop(alive);
         service.desks.remove(&self.name);
         closed.and(served.map(drop))
     }
@@ -235,10 +233,8 @@ impl Rig {
 pub(super) enum RigError {
     #[error(transparent)]
     Bus(#[from] BusError),
-    #[error(transparent)]
-    Failed(Failure),
-    #[error("rig {rig:?}: the run did not close within {CLOSING_TIMEOUT:?}: its recording may lack its end")]
-    Hung { rig: String },
+    #[error("rig {rig:?}: {failure}")]
+    Failed { rig: String, failure: Failure },
 }
 
 /// Waits until the rig can be tried again: a while or, if its files are wrong, until one of them has changed and is right.
@@ -259,7 +255,7 @@ async fn wait_again(state: &mut State, name: &str, service: &Service) {
         let all = service.config.rigs.files.clone();
         let Ok(Ok(rigs)) = tokio::task::spawn_blocking(|| Rigs::load(all)).await else { continue };
         if let Some(files) = rigs.served.into_iter().find(|files| files.rig.name == name) {
-            *state = State::Known(Box::new(files));
+            *state = State::Known(Arc::new(files));
             return;
         }
         for refused in rigs.refused.iter().filter(|refused| refused.name == name) {
@@ -298,7 +294,7 @@ async fn broken_off(engine: &Engine) {
 }
 
 /// Ends the run in progress: stop, retract, close the recording.
-async fn end_run(engine: &Engine, reason: String) -> Result<(), Failure> {
-    engine.stop(StopOrder { by: "signal".into(), reason, abort: false });
+async fn end_run(engine: &Engine, by: &str, reason: String) -> Result<(), Failure> {
+    engine.stop(StopOrder { by: by.into(), reason, abort: false });
     timeout(CLOSING_TIMEOUT, engine.released()).await.map_err(|_| Failure::Hung)
 }

@@ -52,15 +52,21 @@ impl Standings {
     }
 }
 
+/// Rigs that systemd's line names.
+const NAMED_MAX: usize = 5;
+
 /// Whether the frames of any rig flow, and systemd's line.
 fn in_words(all: &BTreeMap<Arc<str>, Standing>) -> (bool, String) {
     let flow = all.values().filter(|standing| **standing == Standing::Flows).count();
     if let (Some((rig, _)), 1) = (all.first_key_value(), all.len()) {
         return (flow == 1, format!("rig {rig}: frames flow"));
     }
-    let missing: Vec<_> =
-        all.iter().filter(|(_, of)| **of != Standing::Flows).map(|(rig, _)| &**rig).collect();
-    let without =
-        if missing.is_empty() { String::new() } else { format!(", not those of {}", missing.join(", ")) };
+    let mut missing = all.iter().filter(|(_, of)| **of != Standing::Flows).map(|(rig, _)| &**rig);
+    let named: Vec<_> = missing.by_ref().take(NAMED_MAX).collect();
+    let without = match (named.is_empty(), missing.count()) {
+        (true, _) => String::new(),
+        (false, 0) => format!(", not those of {}", named.join(", ")),
+        (false, more) => format!(", not those of {} and {more} more", named.join(", ")),
+    };
     (flow > 0, format!("frames of {flow} of {} rigs flow{without}", all.len()))
 }
