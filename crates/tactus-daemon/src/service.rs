@@ -45,7 +45,7 @@ use tactus_schema::key::Keys;
 use tokio::runtime::Handle;
 use tokio::sync::watch;
 use tokio::task::{JoinError, JoinSet};
-use tracing::{Instrument, Span, error, info, info_span};
+use tracing::{Instrument, Span, error, error_span, info};
 
 use crate::inhibitor::{self, Runs};
 use crate::notify::{self, Systemd};
@@ -178,7 +178,7 @@ async fn serve(mut config: ServiceConfig) -> Result<(), ServiceError> {
     let mut keeping = JoinSet::new();
     for rig in rigs {
         // With one rig its name would only lengthen each line.
-        let span = if are_several { info_span!("rig", name = &*rig.name) } else { Span::none() };
+        let span = if are_several { error_span!("rig", name = &*rig.name) } else { Span::none() };
         keeping.spawn(rig.keep(Arc::clone(&service)).instrument(span));
     }
 

@@ -86,8 +86,13 @@ pub(super) async fn all(node: &Arc<Node>, config: &mut ServiceConfig) -> Result<
     for refused in &config.rigs.refused {
         let same = rigs.iter_mut().find(|(name, _)| **name == *refused.name);
         match same.map(|(_, state)| state) {
-            // Its problem names this file, too.
-            Some(State::Refused { files, .. }) => files.push(refused.path.clone()),
+            Some(State::Refused { files, problem }) => {
+                files.push(refused.path.clone());
+                // Rigs of one name have one problem, which names all files.
+                if *problem != refused.problem {
+                    *problem = format!("{problem}\n{}", refused.problem);
+                }
+            }
             Some(State::Known(_)) => {}
             None => {
                 let (files, problem) = (vec![refused.path.clone()], refused.problem.clone());
@@ -119,7 +124,10 @@ impl Rig {
             let problem = match &self.state {
                 State::Known(files) => {
                     let files = Arc::clone(files);
-                    match self.attend(&files, &service).await {
+                    // A panic is this rig's alone.
+                    let attended = AssertUnwindSafe(self.attend(&files, &service)).catch_unwind().await;
+                    service.desks.remove(&self.name);
+                    match attended.unwrap_or(Err(Failure::Panic)) {
                         Ok(()) => break,
                         Err(failure) => {
                             if !service.config.rigs.are_several || service.ending.borrow().is_some() {
@@ -191,7 +199,7 @@ impl Rig {
                 () = service.runs.count(&engine) => Err(Failure::Panic),
             }
         };
-        // A panic of one of these is this rig's alone.
+        // After a panic of one of these the run is ended all the same.
         let served = AssertUnwindSafe(serving).catch_unwind().await.unwrap_or(Err(Failure::Panic));
         let (by, reason) = match &served {
             Ok(why) => ("signal", format!("{why}: the service closes down")),
@@ -199,7 +207,6 @@ impl Rig {
         };
         let closed = end_run(&engine, by, reason).await;
         drop(alive);
-        service.desks.remove(&self.name);
         closed.and(served.map(drop))
     }
 
