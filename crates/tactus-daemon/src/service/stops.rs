@@ -47,7 +47,9 @@ pub(super) fn answer(desks: &Desks, mut stops: mpsc::Receiver<CommandCall>) {
         }
         let stop = |call: CommandCall| {
             let concerned = desks.of(call.rig.as_deref());
-            concerned.iter().for_each(|(_, desk)| desk.stop(&call.request));
+            for (_, desk) in &concerned {
+                desk.stop(&call.request);
+            }
             (call, concerned)
         };
         let stopped: Vec<_> = calls.into_iter().map(stop).collect();
