@@ -36,6 +36,7 @@ def test_schemas_are_foxgloves(view):
     with open(view, "rb") as file:
         summary = make_reader(file).get_summary()
     assert {schema.name for schema in summary.schemas.values()} == set(SCHEMAS)
+    assert {(one.metadata["rig"], one.metadata["simulated"]) for one in summary.channels.values()} == {("sim", "true")}
     for schema in summary.schemas.values():
         ours = {file.name: file for file in FileDescriptorSet.FromString(schema.data).file}
         theirs = FileDescriptorProto()
@@ -64,7 +65,8 @@ def test_the_tip_is_a_transform_and_the_run_a_log(view):
     z = [transform.translation.z for transform in messages(view, "/tf")]
     assert abs(min(z) + 0.6e-3) < 1e-6, "metres"
     lines = list(messages(view, "/log"))
-    assert lines[0].name == "started" and lines[-1].name == "finished" and lines[-1].level == Log_pb2.Log.INFO
+    assert (lines[0].name, lines[0].message) == ("rig", "rig sim, which is SIMULATED")
+    assert lines[1].name == "started" and lines[-1].name == "finished" and lines[-1].level == Log_pb2.Log.INFO
 
 
 def test_prometheus_reads_the_metrics(lab):

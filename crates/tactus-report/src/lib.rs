@@ -7,7 +7,7 @@
 //! [`figures`] computes the paper's figures from the model. [`calibration`] reports a calibration, [`discovery`] the
 //! effects that a model was missing, [`study`] a repetition of the paper on one rig.
 //!
-//! [`viewer_file`] writes a recording for stock MCAP viewers.
+//! [`viewer_file`] writes a recording for stock MCAP viewers; [`viewer`] makes the messages, live ones too.
 //!
 //! - [`fit`] fits polynomials by least squares, with standard errors.
 //! - [`plot`] draws figures and heat images as SVG; it does not depend on the reports.
@@ -18,13 +18,13 @@ pub mod figures;
 pub mod fit;
 pub mod plot;
 pub mod study;
+pub mod viewer;
 
 mod document;
 mod markup;
 mod numbers;
 mod page;
 mod run;
-mod viewer;
 
 pub use page::render_html;
 pub use run::{

@@ -3,6 +3,7 @@
 //!
 //! It is a file of its own: a recording keeps what was measured, once.
 
+mod scene;
 mod schemas;
 
 use std::{
@@ -20,21 +21,7 @@ use tactus_schema::{
 };
 
 use crate::run::{ReportError, log::in_words};
-use schemas::{
-    FrameTransform, Grid, Level, Log, PackedElementField, Pose, Quaternion, RawImage, Timestamp, Vector2,
-    Vector3,
-};
-
-/// The viewers' schemas, as the package foxglove-schemas-protobuf 0.4 (MIT) has them: Grid, `RawImage`, `FrameTransform`, Log.
-const SCHEMAS: &[u8] = include_bytes!("../foxglove/schemas.binpb");
-
-/// Viewers have metres.
-const M_PER_MM: f64 = 1e-3;
-
-/// Name of the frames of reference.
-const ROBOT: &str = "robot";
-const SENSOR: &str = "sensor";
-const TIP: &str = "tip";
+pub use scene::{Channel, ENCODING, Level, SCHEMAS, Scene, log_line, rig_in_words};
 
 /// What was written.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -88,17 +75,22 @@ fn write(recording: &Path, timeline: &Timeline, part: &Path) -> Result<Written, 
     for entry in read(recording)? {
         let Entry::Message { message, at, .. } = entry.map_err(read_failed)? else { continue };
         if !is_placed {
-            viewer.sensor_at(rig, at).map_err(failed)?;
+            viewer.put(Channel::Sensor, &viewer.scene.sensor(at), at).map_err(failed)?;
+            viewer.log(Level::Info, "rig", &rig_in_words(&rig.name, rig.simulated), at).map_err(failed)?;
+            written.lines += 1;
             is_placed = true;
         }
         #[expect(clippy::wildcard_enum_match_arm, reason = "other kinds have no picture")]
         match message {
             Message::Frame(frame) => {
-                viewer.frame(&frame, &zero.rises(&frame), greatest_counts, at).map_err(failed)?;
+                viewer.frame(&zero.rises(&frame), greatest_counts, at).map_err(failed)?;
                 written.frames += 1;
             }
             Message::Stage(state) => {
-                written.positions += u64::from(viewer.tip_at(&state, at).map_err(failed)?);
+                if let Some(tip) = viewer.scene.tip(&state, at) {
+                    viewer.put(Channel::Tip, &tip, at).map_err(failed)?;
+                    written.positions += 1;
+                }
             }
             Message::Event(event) => {
                 zero.take(&event);
@@ -182,152 +174,43 @@ fn level_of(event: &pb::RunEvent) -> Level {
 /// A file of the viewers' messages being written.
 struct Viewer {
     mcap: mcap::Writer<BufWriter<File>>,
-    channels: [u16; 5],
-    /// Size of the grid's cells, x and y.
-    cell_mm: [f64; 2],
-    corner_mm: [f64; 2],
-    shape: [usize; 2],
-}
-
-#[derive(Clone, Copy)]
-enum Channel {
-    Grid,
-    Image,
-    Tip,
-    Sensor,
-    Log,
+    channels: [u16; Channel::ALL.len()],
+    scene: Scene,
 }
 
 impl Viewer {
     fn create(path: &Path, rig: &Rig) -> Result<Self, mcap::McapError> {
         let file = BufWriter::new(File::create(path)?);
         let mut mcap = mcap::WriteOptions::new().profile("").library("tactus").create(file)?;
-        let mut channels = [0; 5];
-        for (channel, (topic, schema)) in channels.iter_mut().zip([
-            ("/array/grid", "foxglove.Grid"),
-            ("/array/image", "foxglove.RawImage"),
-            ("/tf", "foxglove.FrameTransform"),
-            ("/tf/sensor", "foxglove.FrameTransform"),
-            ("/log", "foxglove.Log"),
-        ]) {
-            let schema = mcap.add_schema(schema, "protobuf", SCHEMAS)?;
-            *channel = mcap.add_channel(schema, topic, "protobuf", &BTreeMap::new())?;
+        let about = BTreeMap::from([
+            ("rig".to_owned(), rig.name.clone()),
+            ("simulated".to_owned(), rig.simulated.to_string()),
+        ]);
+        let mut channels = [0; Channel::ALL.len()];
+        for (id, channel) in channels.iter_mut().zip(Channel::ALL) {
+            let schema = mcap.add_schema(channel.schema(), ENCODING, SCHEMAS)?;
+            *id = mcap.add_channel(schema, channel.topic(), ENCODING, &about)?;
         }
-        let array = &rig.array;
-        // A grid's cells are even; those of an array need not be.
-        let even = |centres: &[f64], size_mm: f64| match centres {
-            [first, .., last] => (last - first) / (centres.len() - 1) as f64,
-            _ => size_mm,
-        };
-        let [x_mm, y_mm] = array.element_mm();
-        let cell_mm = [even(array.col_centres_mm(), x_mm), even(array.row_centres_mm(), y_mm)];
-        let first = |centres: &[f64]| centres.first().copied().unwrap_or(0.0);
-        let corner_mm = [
-            first(array.col_centres_mm()) - cell_mm[0] / 2.0,
-            first(array.row_centres_mm()) - cell_mm[1] / 2.0,
-        ];
-        Ok(Self { mcap, channels, cell_mm, corner_mm, shape: [array.rows(), array.cols()] })
+        Ok(Self { mcap, channels, scene: Scene::of(rig) })
     }
 
-    fn put(
-        &mut self,
-        channel: Channel,
-        message: &impl prost::Message,
-        at: WallTime,
-    ) -> Result<(), mcap::McapError> {
+    fn put(&mut self, channel: Channel, message: &[u8], at: WallTime) -> Result<(), mcap::McapError> {
         let log_time = u64::try_from(at.ns()).unwrap_or(0);
         let channel_id = self.channels[channel as usize];
         let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time: log_time };
-        self.mcap.write_to_known_channel(&header, &message.encode_to_vec())
+        self.mcap.write_to_known_channel(&header, message)
     }
 
-    fn sensor_at(&mut self, rig: &Rig, at: WallTime) -> Result<(), mcap::McapError> {
-        let [x_mm, y_mm] = rig.registration.origin_mm;
-        let half = rig.registration.rotation_deg.to_radians() / 2.0;
-        let transform = FrameTransform {
-            timestamp: Some(Timestamp::of(at)),
-            parent_frame_id: ROBOT.into(),
-            child_frame_id: SENSOR.into(),
-            translation: Some(metres([x_mm, y_mm, 0.0])),
-            rotation: Some(Quaternion { x: 0.0, y: 0.0, z: half.sin(), w: half.cos() }),
-        };
-        self.put(Channel::Sensor, &transform, at)
-    }
-
-    /// False if the stage does not say where it is.
-    fn tip_at(&mut self, state: &pb::StageState, at: WallTime) -> Result<bool, mcap::McapError> {
-        let position_mm = [state.x_mm, state.y_mm, state.z_mm];
-        if state.status() == pb::StageStatus::Disconnected || !position_mm.iter().all(|mm| mm.is_finite()) {
-            return Ok(false);
+    fn frame(&mut self, rises: &[f32], white_counts: f32, at: WallTime) -> Result<(), mcap::McapError> {
+        for (channel, message) in self.scene.frame(rises, white_counts, at).into_iter().flatten() {
+            self.put(channel, &message, at)?;
         }
-        let transform = FrameTransform {
-            timestamp: Some(Timestamp::of(at)),
-            parent_frame_id: ROBOT.into(),
-            child_frame_id: TIP.into(),
-            translation: Some(metres(position_mm)),
-            rotation: Some(Quaternion::NONE),
-        };
-        self.put(Channel::Tip, &transform, at)?;
-        Ok(true)
-    }
-
-    fn frame(
-        &mut self,
-        frame: &Frame,
-        rises: &[f32],
-        greatest: f32,
-        at: WallTime,
-    ) -> Result<(), mcap::McapError> {
-        let [rows, cols] = self.shape;
-        if frame.counts.len() != rows * cols {
-            return Ok(());
-        }
-        let number = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-        let timestamp = Some(Timestamp::of(at));
-        let grid = Grid {
-            timestamp,
-            frame_id: SENSOR.into(),
-            pose: Some(Pose {
-                position: Some(metres([self.corner_mm[0], self.corner_mm[1], 0.0])),
-                orientation: Some(Quaternion::NONE),
-            }),
-            column_count: number(cols),
-            cell_size: Some(Vector2 { x: self.cell_mm[0] * M_PER_MM, y: self.cell_mm[1] * M_PER_MM }),
-            row_stride: number(4 * cols),
-            cell_stride: 4,
-            fields: vec![PackedElementField {
-                name: "rise_counts".into(),
-                offset: 0,
-                r#type: PackedElementField::FLOAT32,
-            }],
-            data: rises.iter().flat_map(|rise| rise.to_le_bytes()).collect(),
-        };
-        self.put(Channel::Grid, &grid, at)?;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 0 and 255")]
-        let grey = |rise: f32| (255.0 * (rise / greatest).clamp(0.0, 1.0)) as u8;
-        // The first line of an image is its top; row 0 of an array is at the bottom.
-        let data = rises.chunks(cols).rev().flatten().map(|rise| grey(*rise)).collect();
-        let image = RawImage {
-            timestamp,
-            frame_id: SENSOR.into(),
-            width: number(cols),
-            height: number(rows),
-            encoding: "mono8".into(),
-            step: number(cols),
-            data,
-        };
-        self.put(Channel::Image, &image, at)
+        Ok(())
     }
 
     fn log(&mut self, level: Level, name: &str, message: &str, at: WallTime) -> Result<(), mcap::McapError> {
-        let (name, message) = (name.to_owned(), message.to_owned());
-        let line = Log { timestamp: Some(Timestamp::of(at)), level: level as i32, message, name };
-        self.put(Channel::Log, &line, at)
+        self.put(Channel::Log, &log_line(level, name, message, at), at)
     }
-}
-
-fn metres([x, y, z]: [f64; 3]) -> Vector3 {
-    Vector3 { x: x * M_PER_MM, y: y * M_PER_MM, z: z * M_PER_MM }
 }
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {

@@ -21,18 +21,33 @@ pub(crate) struct Feed {
     /// Number of the first log entry that was not told.
     told_log: u64,
     tells: u32,
+    #[cfg(feature = "foxglove")]
+    pub(crate) channels: crate::foxglove::Channels,
 }
 
 impl Feed {
     pub(crate) fn new(board: Board) -> Self {
         // Drop-oldest: nothing waits for a page.
         let (pages, _) = broadcast::channel(BEHIND_MAX);
-        Self { board, pages, told_rig: String::new(), told_view: String::new(), told_log: 0, tells: 0 }
+        Self {
+            board,
+            pages,
+            told_rig: String::new(),
+            told_view: String::new(),
+            told_log: 0,
+            tells: 0,
+            #[cfg(feature = "foxglove")]
+            channels: crate::foxglove::Channels::default(),
+        }
     }
 
     /// Takes a frame, and passes it on if it is new.
     pub(crate) fn on_frame(&mut self, frame: pb::Frame, missed: u64) {
         let is_new = self.board.on_frame(frame, missed);
+        #[cfg(feature = "foxglove")]
+        if is_new {
+            self.channels.on_frame(&self.board);
+        }
         if is_new
             && self.pages.receiver_count() > 0
             && let Some(json) = self.board.frame_json()
@@ -41,8 +56,17 @@ impl Feed {
         }
     }
 
+    /// Takes a report of the stage.
+    pub(crate) fn on_stage(&mut self, stage: pb::StageState) {
+        self.board.stage = Some(stage);
+        #[cfg(feature = "foxglove")]
+        self.channels.on_stage(&self.board);
+    }
+
     /// Tells what has changed since the last call, and the view now and then in any case.
     pub(crate) fn tell(&mut self) {
+        #[cfg(feature = "foxglove")]
+        self.channels.tell(&self.board);
         if self.pages.receiver_count() == 0 {
             return;
         }

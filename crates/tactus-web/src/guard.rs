@@ -38,6 +38,14 @@ impl Hosts {
             || self.names.iter().any(|known| known.eq_ignore_ascii_case(name))
     }
 
+    /// The page that sent a request, if it is neither of this site, of whatever port, nor of `friends`.
+    #[cfg(feature = "foxglove")]
+    pub(crate) fn foreign_page<'a>(&self, headers: &'a HeaderMap, friends: &[String]) -> Option<&'a str> {
+        let origin = headers.get(header::ORIGIN)?.to_str().unwrap_or("one that is no text");
+        let is_own = origin.split_once("://").is_some_and(|(_, from)| self.has(from));
+        (!is_own && !friends.iter().any(|friend| friend == origin)).then_some(origin)
+    }
+
     /// The reason for refusing a request, if any.
     fn refusal(&self, method: &Method, headers: &HeaderMap) -> Option<&'static str> {
         let text =

@@ -65,3 +65,20 @@ fn a_proxy_in_front_and_a_place_on_every_network_are_known() {
     assert_eq!(refusal_at("0.0.0.0:7480", &[], &Method::GET, &by_address), None);
     assert!(refusal_at("0.0.0.0:7480", &[], &Method::GET, &[("host", "elsewhere.example")]).is_some());
 }
+
+#[cfg(feature = "foxglove")]
+#[test]
+fn pages_of_other_sites_do_not_even_look_at_the_live_channels() {
+    let hosts = Hosts::new("127.0.0.1:7480".parse().unwrap(), Vec::new());
+    let foreign = |origin: &str| {
+        let headers = [(header::ORIGIN, origin.parse().unwrap())].into_iter().collect();
+        hosts.foreign_page(&headers, &["https://viewer.example".to_owned()]).map(str::to_owned)
+    };
+    for origin in ["https://viewer.example", "http://127.0.0.1:7480", "http://localhost:8080"] {
+        assert_eq!(foreign(origin), None, "{origin}");
+    }
+    for origin in ["https://evil.example", "null", "file://", "https://viewer.example.evil.example"] {
+        assert_eq!(foreign(origin).as_deref(), Some(origin));
+    }
+    assert_eq!(hosts.foreign_page(&HeaderMap::new(), &[]), None, "a program of this machine");
+}

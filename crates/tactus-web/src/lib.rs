@@ -8,6 +8,7 @@
 //! | `GET /` | the page; its scripts and style have their own paths |
 //! | `GET /live` | server-sent events: `rig`, `view`, `log` and `frame`, first all of them, then each when it changes |
 //! | `GET /history` | the frames of the last minutes, as numbers |
+//! | `GET /foxglove` | with the feature `foxglove`: live channels for Foxglove and its relatives, over a WebSocket |
 //! | `GET /metrics` | connections, frames, losses, run, safety and tip, as Prometheus reads them |
 //! | `GET /runs` | the recorded runs with their tags and notes |
 //! | `GET /runs/compare/ID,ID` | in which settings and results runs differ |
@@ -25,6 +26,8 @@
 
 mod board;
 mod feed;
+#[cfg(feature = "foxglove")]
+mod foxglove;
 mod guard;
 mod history;
 mod live;
@@ -73,6 +76,10 @@ struct Options {
     /// Host name that browsers of other machines use for the page, for example behind a proxy; several with commas.
     #[arg(long, env = "TACTUS_WEB_HOST", value_name = "NAME", value_delimiter = ',')]
     host: Vec<String>,
+    /// Site whose pages may show the live channels, besides Foxglove's own and this machine's; several with commas.
+    #[cfg(feature = "foxglove")]
+    #[arg(long, env = "TACTUS_WEB_VIEWER_ORIGIN", value_name = "ORIGIN", value_delimiter = ',')]
+    viewer_origin: Vec<String>,
     /// Folder of the recordings. Default: that of the installed service if it is there, else `runs`.
     #[arg(long, env = "TACTUS_WEB_RUNS", value_name = "DIR")]
     runs: Option<PathBuf>,
@@ -123,7 +130,10 @@ fn run(options: Options) -> anyhow::Result<()> {
         let installed = Some(PathBuf::from(tactus_runs::INSTALLED)).filter(|folder| folder.is_dir());
         let runs = Runs::new(options.runs.or(installed).unwrap_or_else(|| "runs".into()));
         let live = Live::start(options.endpoint, options.rig);
-        let site = site::site(live, runs, guard::Hosts::new(address, options.host), Arc::new(token));
+        let hosts = guard::Hosts::new(address, options.host);
+        let site = site::site(live.clone(), runs, Arc::clone(&hosts), Arc::new(token));
+        #[cfg(feature = "foxglove")]
+        let site = site.merge(foxglove::site(live, hosts, options.viewer_origin));
         let mut terminated = signal(SignalKind::terminate()).context("SIGTERM")?;
         // Without systemd this does nothing.
         let _told = sd_notify::notify(&[NotifyState::Ready]);

@@ -128,7 +128,18 @@ impl Live {
 
     /// The present state, as [`crate::metrics`] has it.
     pub(crate) fn metrics(&self) -> String {
-        crate::metrics::metrics(&self.feed().board)
+        let feed = self.feed();
+        let metrics = crate::metrics::metrics(&feed.board);
+        #[cfg(feature = "foxglove")]
+        let metrics = metrics + &feed.channels.metrics(&feed.board);
+        metrics
+    }
+
+    /// What viewers are told, and the board that it is made of.
+    #[cfg(feature = "foxglove")]
+    pub(crate) fn channels<T>(&self, ask: impl FnOnce(&mut crate::foxglove::Channels, &Board) -> T) -> T {
+        let Feed { channels, board, .. } = &mut *self.feed();
+        ask(channels, board)
     }
 
     /// Takes a zero for all viewers.
@@ -262,7 +273,7 @@ impl Live {
                     return Ok(());
                 },
                 Some(info) = infos.recv() => self.feed().board.info = Some(info),
-                Some(stage) = stages.recv() => self.feed().board.stage = Some(stage),
+                Some(stage) = stages.recv() => self.feed().on_stage(stage),
                 Some(run) = runs.recv() => self.feed().board.run = Some(run),
                 Some(event) = safety.recv() => self.feed().board.on_safety(event),
                 Some(pulse) = health.recv() => self.feed().board.on_health(pulse),

@@ -34,14 +34,15 @@ pub(crate) struct Log {
     safety: Option<(i64, u64)>,
 }
 
+/// What happened once.
 #[derive(Debug, Clone, PartialEq)]
-struct Entry {
-    number: u64,
-    t_wall_ns: i64,
-    run_id: String,
-    kind: &'static str,
-    weight: Weight,
-    text: String,
+pub(crate) struct Entry {
+    pub(crate) number: u64,
+    pub(crate) t_wall_ns: i64,
+    pub(crate) run_id: String,
+    pub(crate) kind: &'static str,
+    pub(crate) weight: Weight,
+    pub(crate) text: String,
 }
 
 #[derive(Debug)]
@@ -126,6 +127,12 @@ impl Log {
     /// JSON of the entries from a number on.
     pub(crate) fn json_from(&self, number: u64) -> Value {
         self.entries.iter().filter(|entry| entry.number >= number).map(Entry::json).collect()
+    }
+
+    /// The entries from a number on.
+    #[cfg(feature = "foxglove")]
+    pub(crate) fn entries_from(&self, number: u64) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(move |entry| entry.number >= number)
     }
 
     fn push(&mut self, t_wall_ns: i64, run_id: &str, kind: &'static str, weight: Weight, text: &str) {

@@ -56,6 +56,15 @@ pub(crate) fn metrics(board: &Board) -> String {
     metrics.lines.join("\n") + "\n"
 }
 
+/// What live viewers missed.
+#[cfg(feature = "foxglove")]
+pub(crate) fn of_viewers(rig: &str, viewers: usize, missed: u64) -> String {
+    let mut metrics = Metrics { lines: Vec::new(), rig: label(rig) };
+    metrics.gauge("tactus_viewers", "viewers that are connected", [plain(viewers as f64)]);
+    metrics.counter("tactus_viewer_messages_missed", "messages that slow viewers missed", missed);
+    metrics.lines.join("\n") + "\n"
+}
+
 fn of_health(metrics: &mut Metrics, health: &pb::Health) {
     let info = format!("version=\"{}\",simulated=\"{}\"", label(&health.version), health.simulated);
     metrics.gauge("tactus_service_info", "the service's version", [(info, 1.0)]);

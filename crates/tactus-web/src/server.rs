@@ -77,7 +77,7 @@ impl Connections {
 
 /// Answers the requests of one connection.
 pub(crate) async fn answer(
-    stream: impl AsyncRead + AsyncWrite + Unpin,
+    stream: impl AsyncRead + AsyncWrite + Send + Unpin + 'static,
     site: Router,
     has_asked: Arc<AtomicBool>,
 ) {
@@ -93,6 +93,8 @@ pub(crate) async fn answer(
         .timer(TokioTimer::new())
         .header_read_timeout(HEADER_TIMEOUT)
         .serve_connection(TokioIo::new(stream), service)
+        // For viewers, which go on with WebSocket.
+        .with_upgrades()
         .await;
     if let Err(error) = served {
         debug!(%error, "a connection broke off");

@@ -91,6 +91,12 @@ impl Zero {
         is_void
     }
 
+    /// The reading of each element that counts as no load; empty if there is no zero at all.
+    #[cfg(feature = "foxglove")]
+    pub(crate) fn counts(&self) -> &[f32] {
+        self.measured.as_ref().map_or(&self.rig_file, |zero| &zero.counts)
+    }
+
     /// JSON for the page; null if there is no zero at all.
     pub(crate) fn json(&self) -> Value {
         match &self.measured {

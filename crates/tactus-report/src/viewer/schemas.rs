@@ -117,21 +117,13 @@ pub(super) struct FrameTransform {
 pub(super) struct Log {
     #[prost(message, optional, tag = "1")]
     pub(super) timestamp: Option<Timestamp>,
-    /// A [`Level`].
+    /// A [`super::Level`].
     #[prost(int32, tag = "2")]
     pub(super) level: i32,
     #[prost(string, tag = "3")]
     pub(super) message: String,
     #[prost(string, tag = "4")]
     pub(super) name: String,
-}
-
-/// How grave a line of the log is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Level {
-    Info = 2,
-    Warning = 3,
-    Error = 4,
 }
 
 impl Timestamp {
