@@ -23,6 +23,8 @@ pub(crate) struct Columns {
     /// Names in the file's order.
     names: Vec<String>,
     places: Places,
+    /// Topics whose messages cannot be read, and why.
+    left_out: BTreeMap<String, String>,
 }
 
 /// A column: numbers, and the cells that are none.
@@ -122,7 +124,14 @@ impl Columns {
         {
             return Err(file_error(path, format!("two columns are named {name:?}")));
         }
-        Ok(Self { path: path.to_owned(), rows, by_name: columns.into_iter().collect(), names, places })
+        Ok(Self {
+            path: path.to_owned(),
+            rows,
+            by_name: columns.into_iter().collect(),
+            names,
+            places,
+            left_out: BTreeMap::new(),
+        })
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -141,6 +150,13 @@ impl Columns {
     /// The column that a key of the mapping names.
     pub(crate) fn get(&self, key: &str, name: &str) -> Result<&Column, ImportError> {
         self.by_name.get(name).ok_or_else(|| {
+            let of_topic = |topic: &str| name.strip_prefix(topic).is_some_and(|field| field.starts_with(':'));
+            if let Some((topic, problem)) = self.left_out.iter().find(|(topic, _)| of_topic(topic)) {
+                return file_error(
+                    &self.path,
+                    format!("{key} of the mapping names {name:?}, and topic {topic:?}: {problem}"),
+                );
+            }
             let listed: Vec<String> =
                 self.names.iter().take(NAMES_LISTED).map(|name| format!("{name:?}")).collect();
             let more = self.names.len() - listed.len();
