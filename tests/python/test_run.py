@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lab import tactus
 
 import tactus_client
 
@@ -112,6 +113,39 @@ def test_a_run_is_paused_resumed_and_stopped(client, presses):
         run.wait()
     assert stopped.value.result.exit_status == "stopped"
     assert tactus_client.open(stopped.value.result).exit_status == "stopped"
+
+
+def test_the_folder_is_known_before_the_first_run(lab):
+    with tactus_client.connect(lab.endpoint) as client:
+        assert Path(client.status().recordings) == lab.folder / "runs"
+        assert client.runs() == []
+
+
+def test_tags_and_notes_are_those_of_the_command_line(lab, presses, monkeypatch):
+    with tactus_client.connect(lab.endpoint) as client:
+        run_id = client.run(presses).wait().run_id
+        told = client.runs()
+        # The service must not choose where this program writes.
+        with pytest.raises(PermissionError, match="tactus_client.runs"):
+            told[0].tags += ["good"]
+        monkeypatch.chdir(lab.folder)
+        # Now it is the usual folder.
+        (run,) = client.runs()
+    assert (run.run_id, run.tags, run.note) == (run_id, [], "")
+    run.tags += ["good", "dry"]
+    run.note = 'new "covering"\n\x7f\tof 1 mm \u00e9'
+    (listed,) = tactus("runs", "--runs", "runs", "--tag", "good", cwd=lab.folder)["runs"]
+    assert (listed["tags"], listed["note"]) == (["dry", "good"], run.note)
+    tactus("runs", "note", "--runs", "runs", run_id, "another", cwd=lab.folder)
+    assert (run.tags, run.note, told[0].note) == (["dry", "good"], "another", "another")
+    assert "dry good" in tactus_client.runs("runs")._repr_html_()
+    for wrong, error in [(["two words"], ValueError), ([""], ValueError), ([3], TypeError)]:
+        with pytest.raises(error, match="word"):
+            run.tags = wrong
+    run.path.with_name("notes.toml").write_text("tags = 3")
+    with pytest.raises(tactus_client.UnreadableNotes, match=r"notes\.toml"):
+        run.tags  # noqa: B018
+    assert "notes.toml" in tactus_client.runs("runs")._repr_html_()
 
 
 def wait_for(events, run_id, kind):

@@ -501,6 +501,8 @@ pub struct CommandReply {
     pub experiments: ::prost::alloc::vec::Vec<Experiment>,
     #[prost(message, optional, tag = "17")]
     pub plan: ::core::option::Option<Plan>,
+    #[prost(string, tag = "18")]
+    pub recordings: ::prost::alloc::string::String,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct RigDescription {

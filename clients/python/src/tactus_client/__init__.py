@@ -28,6 +28,7 @@ from tactus_client.errors import (
     RunStopped,
     TactusError,
     UnknownRun,
+    UnreadableNotes,
     UnreadableRecording,
 )
 from tactus_client.experiments import Experiment, Parameter, Plan
@@ -82,6 +83,7 @@ __all__ = [
     "Stream",
     "TactusError",
     "UnknownRun",
+    "UnreadableNotes",
     "UnreadableRecording",
     "connect",
     "messages",

@@ -176,16 +176,17 @@ class Client:
     def runs(self, folder: str | os.PathLike[str] | None = None) -> Runs:
         """The recordings of a service on this machine, in the order of their start; or those of another folder.
 
-        Raises ``FileNotFoundError`` if the service has not said where it records, because it made no run since it started.
+        Raises ``FileNotFoundError`` if the service's folder is not on this machine. Tags and notes are written only where the folder
+        was named here, or is a usual one: a service cannot choose where this program writes.
         """
         from tactus_client import recording
 
-        if folder is None:
-            told = self.status().state.recording
-            if not told:
-                raise FileNotFoundError("the service made no run since it started, so it has not said where it records: name the folder")
-            folder = Path(told).parent.parent
-        return recording.runs(folder)
+        if folder is not None:
+            return recording.runs(folder)
+        told = self.status().recordings
+        if not told:
+            raise FileNotFoundError("the service is too old to say where it records: name the folder")
+        return recording.runs_told(Path(told))
 
     @property
     def service(self) -> str | None:

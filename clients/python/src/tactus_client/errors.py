@@ -65,5 +65,9 @@ class UnknownRun(TactusError, LookupError):
     """No run has that id or part of an id, or several have it."""
 
 
+class UnreadableNotes(TactusError, ValueError):
+    """The file with the tags and the note of a run is not one."""
+
+
 class UnreadableRecording(TactusError, ValueError):
     """The file is not the recording of a run, or is damaged at its start."""

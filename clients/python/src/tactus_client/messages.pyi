@@ -40,7 +40,8 @@ class CommandReply(Message):
     description: RigDescription
     experiments: Sequence[Experiment]
     plan: Plan
-    def __init__(self, *, ok: bool | None = ..., error: str | None = ..., exit_code: int | None = ..., state: RunState | None = ..., rig: str | None = ..., version: str | None = ..., stage: StageState | None = ..., health: Health | None = ..., lease: Lease | None = ..., note: str | None = ..., rig_toml: str | None = ..., covering_mm: float | None = ..., depth_max_mm: float | None = ..., safety: SafetyEvent | None = ..., description: RigDescription | None = ..., experiments: Iterable[Experiment] | None = ..., plan: Plan | None = ...) -> None: ...
+    recordings: str
+    def __init__(self, *, ok: bool | None = ..., error: str | None = ..., exit_code: int | None = ..., state: RunState | None = ..., rig: str | None = ..., version: str | None = ..., stage: StageState | None = ..., health: Health | None = ..., lease: Lease | None = ..., note: str | None = ..., rig_toml: str | None = ..., covering_mm: float | None = ..., depth_max_mm: float | None = ..., safety: SafetyEvent | None = ..., description: RigDescription | None = ..., experiments: Iterable[Experiment] | None = ..., plan: Plan | None = ..., recordings: str | None = ...) -> None: ...
 
 class CommandRequest(Message):
     who: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,7 @@ try:
 except ImportError as error:
     raise ImportError(f"recordings are read with numpy and mcap: pip install 'tactus-client[pandas]' ({error})") from error
 
-from tactus_client import html, messages
+from tactus_client import html, messages, notes
 from tactus_client.clock import Array
 from tactus_client.errors import UnknownRun
 from tactus_client.scan import Contents, Head, read_contents, read_head
@@ -56,6 +57,14 @@ def runs(folder: str | os.PathLike[str] | None = None) -> Runs:
     return Runs(_folder(folder))
 
 
+def runs_told(folder: Path) -> Runs:
+    """The recordings of a folder that a service named: marks are written only where the user would look anyway."""
+    is_usual = any(one.is_dir() and one.resolve() == folder.resolve() for one in FOLDERS)
+    if not folder.is_dir():
+        raise FileNotFoundError(f"the service records in {folder}, which is not on this machine")
+    return Runs(folder, is_told=not is_usual)
+
+
 class Recording:
     """A recorded run. Made by ``tactus_client.open``; what it holds is read when it is first asked for.
 
@@ -63,8 +72,10 @@ class Recording:
     the service's monotonic clock. Positions are the tip's in the robot's frame. The numbers are those of ``tactus export``.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, is_told: bool = False):
         self.path = path
+        # Its folder was named by a service, not by who uses this.
+        self._is_told = is_told
         self._head: Head = read_head(path)
         run = self._head.run
         self.run_id: str = run["run_id"]
@@ -78,6 +89,36 @@ class Recording:
         self.started: datetime = EPOCH + timedelta(microseconds=int(run.get("started_wall_ns", 0)) // 1000)
         #: The rig as `tactus.rig/1`.
         self.rig: dict[str, Any] = json.loads(self._head.attachments["rig.json"])
+
+    @property
+    def tags(self) -> list[str]:
+        """Words by which runs are found again. To change them: ``run.tags += ["good"]``, or another list.
+
+        They stand beside the recording, with the note, as ``tactus runs tag`` and the dashboard write them. Raises
+        ``UnreadableNotes``; ``ValueError`` for what is no word, and ``PermissionError`` for a run of a folder that only the service named.
+        """
+        return list(notes.read(self.path).tags)
+
+    @tags.setter
+    def tags(self, tags: Iterable[str]) -> None:
+        self._mark(tags, notes.read(self.path).note)
+
+    @property
+    def note(self) -> str:
+        """What somebody wrote about the run; as ``tags``."""
+        return notes.read(self.path).note
+
+    @note.setter
+    def note(self, note: str) -> None:
+        self._mark(notes.read(self.path).tags, note)
+
+    def _mark(self, tags: Iterable[str], note: str) -> None:
+        if self._is_told:
+            folder = self.path.parent.parent
+            raise PermissionError(
+                f"the service named this folder: to write beside the recording, name it, tactus_client.runs({str(folder)!r})"
+            )
+        notes.write(self.path, tags, note)
 
     @property
     def attachments(self) -> dict[str, bytes]:
@@ -373,13 +414,13 @@ class Recording:
 class Runs(list[Recording]):
     """Recordings in the order of their start; a table in a notebook. Made by ``tactus_client.runs``."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, is_told: bool = False):
         found = []
         #: Files that are not recordings of runs, and why.
         self.unreadable: dict[Path, str] = {}
         for path in _files(folder, DEPTH_MAX):
             try:
-                found.append(Recording(path))
+                found.append(Recording(path, is_told))
             except (OSError, ValueError) as error:
                 self.unreadable[path] = str(error)
         super().__init__(sorted(found, key=lambda run: (run.started, run.run_id)))
@@ -396,10 +437,20 @@ class Runs(list[Recording]):
                 run._head.run.get("rig", ""),
                 f"{run.started:%Y-%m-%d %H:%M}",
                 "SIMULATED" if run.simulated else "",
+                *_marks(run),
             )
             for run in self
         ]
-        return html.table(("run", "experiment", "rig", "started, UTC", ""), rows)
+        return html.table(("run", "experiment", "rig", "started, UTC", "", "tags", "note"), rows)
+
+
+def _marks(run: Recording) -> tuple[str, str]:
+    """Tags and the note's first line; or why there are none."""
+    try:
+        marks = notes.read(run.path)
+    except (OSError, ValueError) as error:
+        return "", str(error)
+    return " ".join(marks.tags), marks.note.partition("\n")[0]
 
 
 def _by_element(name: str, values: Array) -> dict[str, Array]:

@@ -26,6 +26,8 @@ class Status:
         self.description = reply.description
         #: ``SafetyEvent``: what the safety supervisor did last; None if it did nothing since the start of the service.
         self.safety = reply.safety if reply.HasField("safety") else None
+        #: Folder of recordings, on the service's machine.
+        self.recordings = reply.recordings
         self.simulated = reply.health.simulated
         #: What wants a reset before a run can start; empty if nothing does.
         self.fault = reply.state.fault

@@ -22,7 +22,7 @@ use tactus_schema::key::Command;
 use tactus_schema::{MonoTime, Rig, WallTime, pb};
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::time::timeout;
-use tracing::{info, warn};
+use tracing::{Instrument as _, Span, field, info, info_span, warn};
 
 use super::catalogue;
 use super::description::describe;
@@ -148,21 +148,28 @@ impl CommandDesk {
                 (Command::Run, Request::Run(request)) => {
                     // A dry run takes a while: other commands are answered meanwhile.
                     let desk = Arc::clone(self);
-                    tokio::spawn(async move {
+                    let span = info_span!("command run", by = request.who, refused = field::Empty);
+                    let run = async move {
                         let reply = match desk.run(request).await {
                             Ok(note) => pb::CommandReply { note, ..desk.reply(Ok(())) },
-                            Err(refusal) => desk.reply(Err(refusal)),
+                            Err(refusal) => {
+                                Span::current().record("refused", &refusal.error);
+                                desk.reply(Err(refusal))
+                            }
                         };
                         call.reply.reply(reply);
-                    });
+                    };
+                    tokio::spawn(run.instrument(span));
                 }
                 (Command::Reset, Request::Control(request)) => {
                     // Homing takes a while.
                     let desk = Arc::clone(self);
-                    tokio::spawn(async move {
+                    let span = info_span!("command reset", by = request.who);
+                    let reset = async move {
                         let done = desk.reset(&request).await;
                         call.reply.reply(desk.reply(done));
-                    });
+                    };
+                    tokio::spawn(reset.instrument(span));
                 }
                 (Command::Lease, Request::Lease(request)) => {
                     let reply = match self.change_lease(&request) {
@@ -184,7 +191,9 @@ impl CommandDesk {
                 (Command::Status, Request::Control(_)) => {
                     let rig_toml = self.places.files.texts.rig_toml.clone();
                     let description = describe(&self.engine.rig());
-                    call.reply.reply(pb::CommandReply { rig_toml, description, ..self.reply(Ok(())) });
+                    let recordings = self.places.recordings.display().to_string();
+                    let reply = self.reply(Ok(()));
+                    call.reply.reply(pb::CommandReply { rig_toml, description, recordings, ..reply });
                 }
                 (Command::Experiments, Request::Control(_)) => {
                     let desk = Arc::clone(self);
@@ -330,7 +339,9 @@ impl CommandDesk {
         let rig = self.engine.rig();
         let now = self.engine.clock().now().wall;
         let twin_rig = rig.clone();
+        let span = info_span!("dry run");
         let prepare = move || {
+            let _entered = span.entered();
             let prepared = prepare(wanted, &twin_rig, now, &|| claim.check().is_err());
             (claim, prepared)
         };
@@ -356,7 +367,7 @@ impl CommandDesk {
         self.recorder.send_replace(gauge);
         order.recording = path.display().to_string();
         let run_id = order.run_id.clone();
-        tokio::spawn(claim.run(order, Box::new(record)));
+        tokio::spawn(claim.run(order, Box::new(record)).in_current_span());
         // The answer contains the state of this run, not of the previous one.
         self.engine.state().wait_for(|state| state.run_id == run_id).await.map_err(Refusal::failed)?;
         Ok(note)
