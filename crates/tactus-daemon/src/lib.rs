@@ -3,5 +3,7 @@
 mod inhibitor;
 mod notify;
 mod service;
+#[cfg(feature = "otel")]
+mod telemetry;
 
 pub use service::{command, main};

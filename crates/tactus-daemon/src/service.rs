@@ -41,6 +41,8 @@ use tactus_bus::{BusConfig, BusError, Node, TlsConfig};
 use tactus_log::LogFormat;
 use tactus_runner::config::{ConfigError, ServiceConfig, TlsSection};
 use tactus_runner::signals::EndingSignals;
+#[cfg(feature = "otel")]
+use tactus_schema::MonoTime;
 use tactus_schema::key::Keys;
 use tokio::runtime::Handle;
 use tokio::sync::watch;
@@ -49,6 +51,8 @@ use tracing::{Instrument, Span, error, error_span, info};
 
 use crate::inhibitor::{self, Runs};
 use crate::notify::{self, Systemd};
+#[cfg(feature = "otel")]
+use crate::telemetry::{self, Telemetry};
 use rig::{RigError, Service};
 use standing::Standings;
 use stops::Desks;
@@ -69,6 +73,16 @@ struct Options {
     /// Folder of recordings; overrides the configuration.
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
+    /// Collector of OpenTelemetry for spans and metrics, over HTTP. Without a value, the one of this machine at port 4318.
+    #[cfg(feature = "otel")]
+    #[arg(
+        long,
+        value_name = "URL",
+        env = "OTEL_EXPORTER_OTLP_ENDPOINT",
+        num_args = 0..=1,
+        default_missing_value = crate::telemetry::LOOPBACK
+    )]
+    otlp: Option<String>,
 }
 
 /// Why the service ended.
@@ -100,7 +114,22 @@ pub fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    let _log = tactus_log::start(options.log.unwrap_or(config.log.format), &config.log.filter);
+    let format = options.log.unwrap_or(config.log.format);
+    #[cfg(feature = "otel")]
+    let telemetry = options.otlp.as_deref().map(|url| Telemetry::start(url, &config.rigs.served)).transpose();
+    #[cfg(feature = "otel")]
+    let listener = telemetry.as_ref().ok().and_then(|telemetry| Some(telemetry.as_ref()?.listener()));
+    #[cfg(not(feature = "otel"))]
+    let listener = None;
+    let _log = tactus_log::start_with(format, &config.log.filter, listener);
+    #[cfg(feature = "otel")]
+    let _telemetry = match telemetry {
+        Ok(telemetry) => telemetry,
+        Err(error) => {
+            error!("{error}");
+            return ExitCode::from(2);
+        }
+    };
     // Clients are told where a recording is, and have other working directories.
     let recordings = match std::path::absolute(options.recordings.as_ref().unwrap_or(&config.recordings)) {
         Ok(recordings) => recordings,
@@ -181,6 +210,16 @@ async fn serve(mut config: ServiceConfig) -> Result<(), ServiceError> {
         let span = if are_several { error_span!("rig", name = &*rig.name) } else { Span::none() };
         keeping.spawn(rig.keep(Arc::clone(&service)).instrument(span));
     }
+
+    #[cfg(feature = "otel")]
+    telemetry::observe({
+        let desks = service.desks.clone();
+        move || {
+            let health =
+                |(rig, desk): (Arc<str>, Arc<CommandDesk>)| (rig, desk.health((0, MonoTime::default())));
+            desks.of(None).into_iter().map(health).collect()
+        }
+    });
 
     let mut closed = Ok(());
     let signalled = loop {

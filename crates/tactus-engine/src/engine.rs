@@ -13,7 +13,7 @@ use tactus_schema::rig::Service;
 use tactus_schema::{MonoTime, Rig, pb};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
-use tracing::Instrument;
+use tracing::{Instrument as _, field, info_span};
 
 use crate::acquisition::{Gone, Mailbox, acquire, mailbox};
 use crate::motion::WayUp;
@@ -598,10 +598,11 @@ impl Claim {
     /// the caller does not wait for it.
     pub async fn run(self, order: RunOrder, record: Box<dyn Record>) -> RunOutcome {
         let (run_id, experiment) = (order.run_id.clone(), order.script.name().to_owned());
+        let span = info_span!("run", run_id, experiment, exit_status = field::Empty, presses = field::Empty);
         // A task of its own, watched by another: neither a panic of the run nor an impatient caller leaves the tip.
         let run = tokio::spawn(async move {
             let shared = Arc::clone(&self.0);
-            let run = tokio::spawn(Run::execute(Arc::clone(&shared), order.clone(), record));
+            let run = tokio::spawn(Run::execute(Arc::clone(&shared), order.clone(), record).instrument(span));
             let outcome = match run.await {
                 Ok(outcome) => outcome,
                 Err(panic) => rescue(&shared, order, &panic).await,

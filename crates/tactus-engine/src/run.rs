@@ -15,7 +15,7 @@ use tactus_schema::table::Phase;
 use tactus_schema::{MonoTime, pb};
 use tokio::task::{JoinError, spawn_blocking};
 use tokio::time::timeout;
-use tracing::{error, info};
+use tracing::{Span, error, info};
 
 use crate::acquisition::{Acquisition, Ended, Tally};
 use crate::engine::Shared;
@@ -346,6 +346,7 @@ impl Run {
             Err(failure) => (pb::ExitStatus::Failed, failure.to_string()),
         };
         info!(run = self.order.run_id, exit_status = exit_status.as_str_name(), message, "run ends");
+        Span::current().record("exit_status", exit_status.word()).record("presses", i64::from(self.presses));
         if let Err(gone) = self.shared.acquisition.ask(Acquisition::refresh_state).await {
             error!("{gone}");
         }

@@ -16,10 +16,12 @@ use std::time::Duration;
 
 use serde::Deserialize;
 use tracing::{Event, Level, Subscriber, error, warn};
-use tracing_subscriber::EnvFilter;
-use tracing_subscriber::fmt::format::{FmtSpan, Writer};
+use tracing_subscriber::filter::{EnvFilter, filter_fn};
+use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
-use tracing_subscriber::registry::LookupSpan;
+use tracing_subscriber::layer::{Layer, SubscriberExt as _};
+use tracing_subscriber::registry::{LookupSpan, Registry};
+use tracing_subscriber::util::SubscriberInitExt as _;
 
 pub use lines::{LINE_MAX_BYTES, Lines, QUEUE_MAX_BYTES};
 
@@ -36,6 +38,9 @@ pub enum LogFormat {
     /// One JSON object per entry.
     Json,
 }
+
+/// Something else that hears what is logged, and the spans.
+pub type Listener = Box<dyn Layer<Registry> + Send + Sync>;
 
 /// The log of a program. Dropping it waits for the last lines, at most 200 ms.
 #[derive(Debug)]
@@ -56,6 +61,11 @@ impl Drop for Log {
 /// Under journald, which adds times itself, lines have neither times nor colours, and a line's level is the entry's
 /// priority: `journalctl -p warning` shows warnings and errors.
 pub fn start(format: LogFormat, filter: &str) -> Log {
+    start_with(format, filter, None)
+}
+
+/// As [`start`], with a listener. Lines do not show in which spans they are; the listener knows.
+pub fn start_with(format: LogFormat, filter: &str, listener: Option<Listener>) -> Log {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(filter));
     // Not through the standard library's handle: its lock would be held while a line waits for its reader.
     let opened = io::stderr().as_fd().try_clone_to_owned().map(File::from);
@@ -63,17 +73,18 @@ pub fn start(format: LogFormat, filter: &str) -> Log {
         // Without a file or a thread there is no log; the program is more important.
         return Log(None);
     };
-    let lines = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(queue.clone())
-        .with_span_events(FmtSpan::NONE)
-        .with_ansi(io::stderr().is_terminal());
-    let started = match (format, is_journal()) {
-        (LogFormat::Json, true) => lines.json().flatten_event(true).map_event_format(Ranked).try_init(),
-        (LogFormat::Json, false) => lines.json().flatten_event(true).try_init(),
-        (LogFormat::Text, true) => lines.without_time().map_event_format(Ranked).try_init(),
-        (LogFormat::Text, false) => lines.try_init(),
+    let lines =
+        tracing_subscriber::fmt::layer().with_writer(queue.clone()).with_ansi(io::stderr().is_terminal());
+    let lines: Listener = match (format, is_journal()) {
+        (LogFormat::Json, true) => lines.json().flatten_event(true).map_event_format(Ranked).boxed(),
+        (LogFormat::Json, false) => lines.json().flatten_event(true).boxed(),
+        (LogFormat::Text, true) => lines.without_time().map_event_format(Ranked).boxed(),
+        (LogFormat::Text, false) => lines.boxed(),
     };
+    #[expect(clippy::redundant_closure_for_method_calls, reason = "the method alone is of one lifetime")]
+    let lines = lines.with_filter(filter_fn(|metadata| metadata.is_event())).boxed();
+    let listeners: Vec<Listener> = listener.into_iter().chain([lines]).collect();
+    let started = tracing_subscriber::registry().with(listeners).with(filter).try_init();
     if started.is_err() {
         // A second start, as in tests, changes nothing.
         return Log(None);

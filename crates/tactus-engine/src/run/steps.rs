@@ -11,7 +11,7 @@ use tactus_schema::rig::OnGap;
 use tactus_schema::table::Phase;
 use tokio::task::spawn_blocking;
 use tokio::time::{sleep, timeout};
-use tracing::{info, warn};
+use tracing::{Instrument as _, info, info_span, warn};
 
 use super::{Broken, Run};
 use crate::average::Average;
@@ -45,7 +45,9 @@ impl Run {
             step_json: to_json(&call.step),
         }))
         .await;
-        let reply = self.act(&call.step).await?;
+        let span =
+            info_span!("step", number = step.cast_signed(), what = describe(&call.step), at = %call.at);
+        let reply = self.act(&call.step).instrument(span).await?;
         let height_mm = if let Reply::Position { height_mm, .. } = &reply { Some(*height_mm) } else { None };
         self.emit(Event::StepDone(pb::StepDone { step, height_mm })).await;
         Ok(reply)

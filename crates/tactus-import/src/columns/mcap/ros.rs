@@ -74,12 +74,12 @@ impl Decoder {
             }
         }
         definitions.insert(current.0, current.1);
-        let used = definitions.values().flatten().filter_map(|field| match &field.kind {
-            Kind::Message(name) => Some(name),
-            _ => None,
-        });
-        if let Some(unknown) = used.into_iter().find(|name| !definitions.contains_key(*name) && *name != TIME)
-        {
+        let used = |field: &Field| match field {
+            Field { kind: Kind::Message(name), .. } => Some(name.clone()),
+            Field { .. } => None,
+        };
+        let mut used = definitions.values().flatten().filter_map(used);
+        if let Some(unknown) = used.find(|name| !definitions.contains_key(name) && name != TIME) {
             return Err(format!("the schema of {name} does not describe {unknown}"));
         }
         Ok(Self { name, definitions })
