@@ -27,4 +27,5 @@ mod stage;
 mod stop_trials;
 mod truth;
 mod unread;
+mod watch;
 mod web;

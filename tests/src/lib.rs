@@ -5,6 +5,7 @@
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot go on says why and fails")]
 
 mod tap;
+mod terminal;
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};
@@ -24,6 +25,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 pub use tap::{Tap, Way};
+pub use terminal::Terminal;
 
 /// Only a hang takes this long.
 pub const DEADLINE: Duration = Duration::from_mins(2);

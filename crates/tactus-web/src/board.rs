@@ -2,11 +2,8 @@
 
 use serde::Serialize;
 use serde_json::{Value, json};
+use tactus_live::{History, Log, Order, TAKEN_FRAMES, Weight, Zero};
 use tactus_schema::pb;
-
-use crate::history::{History, Order};
-use crate::log::{Log, Weight};
-use crate::zero::{TAKEN_FRAMES, Zero};
 
 /// A frame that is older than the service's last sign of life by more is not the present: after a new connection the service tells its
 /// last frames again.

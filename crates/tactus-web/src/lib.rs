@@ -29,9 +29,7 @@ mod feed;
 #[cfg(feature = "foxglove")]
 mod foxglove;
 mod guard;
-mod history;
 mod live;
-mod log;
 mod metrics;
 mod order;
 mod page;
@@ -39,7 +37,6 @@ mod runs;
 mod server;
 mod site;
 mod token;
-mod zero;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;

@@ -121,7 +121,7 @@ impl Live {
         self.feed().whole()
     }
 
-    /// The last minutes, as [`crate::history::History::bytes`] has them.
+    /// The last minutes, as [`tactus_live::History::bytes`] has them.
     pub(crate) fn history(&self) -> Vec<u8> {
         self.feed().board.history.bytes()
     }

@@ -13,24 +13,29 @@ const HEAD_BYTES: usize = 32;
 
 /// The last frames of one array, in order, each with where the tip was.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct History {
+pub struct History {
     elements: usize,
     moments: VecDeque<Moment>,
 }
 
+/// A frame with where the tip was.
 #[derive(Debug, Clone)]
-struct Moment {
+pub struct Moment {
     seq: u64,
-    t_s: f64,
+    /// When it reached the service: its monotonic clock.
+    pub t_s: f64,
     t_wall_ns: i64,
-    tip_mm: [f32; 3],
-    lost_before: u32,
-    counts: Vec<f32>,
+    /// x, y, z; NaN if they are not known.
+    pub tip_mm: [f32; 3],
+    /// Frames known to be lost just before it.
+    pub lost_before: u32,
+    /// One per element, row-major.
+    pub counts: Vec<f32>,
 }
 
 /// What a frame is to those before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Order {
+pub enum Order {
     /// It comes after them.
     Next,
     /// It is one of them: after a new connection the service tells its last frames again.
@@ -41,7 +46,7 @@ pub(crate) enum Order {
 
 impl History {
     /// Keeps a frame, unless it was told before. Older ones go if it is of another array, or of a service that has started anew.
-    pub(crate) fn push(&mut self, frame: &pb::Frame, stage: Option<&pb::StageState>) -> Order {
+    pub fn push(&mut self, frame: &pb::Frame, stage: Option<&pb::StageState>) -> Order {
         let order = match self.moments.back() {
             Some(last) if frame.seq <= last.seq && frame.t_wall_ns <= last.t_wall_ns => return Order::Again,
             Some(last) if frame.seq <= last.seq => Order::Restarted,
@@ -68,8 +73,13 @@ impl History {
         order
     }
 
+    /// The frames, the oldest first.
+    pub fn moments(&self) -> impl DoubleEndedIterator<Item = &Moment> + ExactSizeIterator {
+        self.moments.iter()
+    }
+
     /// Mean counts of the last `frames` frames; `None` if there are fewer, or some were lost between them.
-    pub(crate) fn mean(&self, frames: usize) -> Option<Vec<f32>> {
+    pub fn mean(&self, frames: usize) -> Option<Vec<f32>> {
         let from = self.moments.len().checked_sub(frames).filter(|_| frames > 0)?;
         let mut sums = vec![0.0_f64; self.elements];
         let mut before: Option<u64> = None;
@@ -88,7 +98,7 @@ impl History {
     }
 
     /// Where the tip was lowest in the last `frames` frames, z in mm; `None` if that is not known of each.
-    pub(crate) fn lowest_z_mm(&self, frames: usize) -> Option<f32> {
+    pub fn lowest_z_mm(&self, frames: usize) -> Option<f32> {
         let from = self.moments.len().checked_sub(frames)?;
         let heights = self.moments.range(from..).map(|moment| moment.tip_mm[2]);
         heights.map(|z_mm| Some(z_mm).filter(|z_mm| z_mm.is_finite())).reduce(|a, b| Some(a?.min(b?)))?
@@ -97,7 +107,7 @@ impl History {
     /// All frames for the page, least significant byte first: the number of elements and of frames as `u32`; then for each frame its
     /// number and its time in s as `f64`, x, y and z of the tip in mm and the frames lost before it as `f32`, and its counts as `f32`.
     /// A place of the tip that is not known is NaN.
-    pub(crate) fn bytes(&self) -> Vec<u8> {
+    pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(8 + self.moments.len() * (HEAD_BYTES + 4 * self.elements));
         for number in [self.elements, self.moments.len()] {
             bytes.extend(u32::try_from(number).unwrap_or(u32::MAX).to_le_bytes());

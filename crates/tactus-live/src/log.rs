@@ -15,7 +15,7 @@ const TEXT_BYTES_MAX: usize = 500;
 
 /// How much an entry matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Weight {
+pub enum Weight {
     /// Something was done.
     Note,
     /// Something was lost, refused or paused.
@@ -26,7 +26,7 @@ pub(crate) enum Weight {
 
 /// The last entries, in the order in which they came.
 #[derive(Debug, Default)]
-pub(crate) struct Log {
+pub struct Log {
     entries: VecDeque<Entry>,
     next: u64,
     runs: VecDeque<RunTimes>,
@@ -34,15 +34,21 @@ pub(crate) struct Log {
     safety: Option<(i64, u64)>,
 }
 
-/// What happened once.
+/// Something that happened.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
-    pub(crate) number: u64,
-    pub(crate) t_wall_ns: i64,
-    pub(crate) run_id: String,
-    pub(crate) kind: &'static str,
-    pub(crate) weight: Weight,
-    pub(crate) text: String,
+pub struct Entry {
+    /// Counts all entries of a log.
+    pub number: u64,
+    /// UTC since 1970.
+    pub t_wall_ns: i64,
+    /// Its run; empty if it belongs to none.
+    pub run_id: String,
+    /// Where it comes from, such as `run`, `safety` or `sensor`.
+    pub kind: &'static str,
+    /// How much it matters.
+    pub weight: Weight,
+    /// What happened.
+    pub text: String,
 }
 
 #[derive(Debug)]
@@ -55,7 +61,8 @@ struct RunTimes {
 }
 
 impl Weight {
-    const fn word(self) -> &'static str {
+    /// The word for it, in JSON.
+    pub const fn word(self) -> &'static str {
         match self {
             Self::Note => "note",
             Self::Warning => "warning",
@@ -66,7 +73,7 @@ impl Weight {
 
 impl Log {
     /// An event of a run. Steps, phases and dwells are left out; the run's progress shows them. False if it was told before.
-    pub(crate) fn on_event(&mut self, event: &pb::RunEvent) -> bool {
+    pub fn on_event(&mut self, event: &pb::RunEvent) -> bool {
         match self.runs.iter_mut().rev().find(|run| run.run_id == event.run_id) {
             Some(run) if event.seq <= run.last_seq => return false,
             Some(run) => run.last_seq = event.seq,
@@ -93,7 +100,7 @@ impl Log {
     }
 
     /// Safety news; the run is the last one that had started by then.
-    pub(crate) fn on_safety(&mut self, event: &pb::SafetyEvent) {
+    pub fn on_safety(&mut self, event: &pb::SafetyEvent) {
         let this = (event.t_wall_ns, event.seq);
         if self.safety.replace(this) == Some(this) {
             return;
@@ -104,28 +111,33 @@ impl Log {
     }
 
     /// What this program itself knows, such as a connection that ended.
-    pub(crate) fn note(&mut self, t_wall_ns: i64, kind: &'static str, weight: Weight, text: &str) {
+    pub fn note(&mut self, t_wall_ns: i64, kind: &'static str, weight: Weight, text: &str) {
         self.push(t_wall_ns, "", kind, weight, text);
     }
 
     /// The run that had started last at a time; empty if none had.
-    pub(crate) fn run_at(&self, t_wall_ns: i64) -> &str {
+    pub fn run_at(&self, t_wall_ns: i64) -> &str {
         let before = self.runs.iter().filter(|run| run.started_wall_ns <= t_wall_ns);
         before.max_by_key(|run| run.started_wall_ns).map_or("", |run| &run.run_id)
     }
 
     /// Who started a run; empty if that is not known.
-    pub(crate) fn who(&self, run_id: &str) -> &str {
+    pub fn who(&self, run_id: &str) -> &str {
         self.runs.iter().find(|run| run.run_id == run_id).map_or("", |run| &run.who)
     }
 
     /// Number of the next entry.
-    pub(crate) fn next(&self) -> u64 {
+    pub fn next(&self) -> u64 {
         self.next
     }
 
+    /// All entries, the oldest first.
+    pub fn entries(&self) -> impl DoubleEndedIterator<Item = &Entry> + ExactSizeIterator {
+        self.entries.iter()
+    }
+
     /// JSON of the entries from a number on.
-    pub(crate) fn json_from(&self, number: u64) -> Value {
+    pub fn json_from(&self, number: u64) -> Value {
         self.entries.iter().filter(|entry| entry.number >= number).map(Entry::json).collect()
     }
 

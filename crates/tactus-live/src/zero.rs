@@ -4,11 +4,11 @@ use serde_json::{Value, json};
 use tactus_schema::pb::{self, run_event::Event};
 
 /// Frames that a zero taken here averages: half a second at 30 Hz.
-pub(crate) const TAKEN_FRAMES: usize = 15;
+pub const TAKEN_FRAMES: usize = 15;
 
 /// Where a zero comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Source {
+pub enum ZeroSource {
     /// The rig file's `baseline_counts`: nothing was measured yet.
     RigFile,
     /// The reading at rest that a run takes before anything else.
@@ -22,7 +22,7 @@ pub(crate) enum Source {
 /// A zero that was measured.
 #[derive(Debug, Clone, PartialEq)]
 struct Measured {
-    source: Source,
+    source: ZeroSource,
     counts: Vec<f32>,
     /// Empty if it was taken here.
     run_id: String,
@@ -31,13 +31,14 @@ struct Measured {
 
 /// The zero in force. A run's own zero replaces any other; a sensor that connects anew voids what was measured.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Zero {
+pub struct Zero {
     rig_file: Vec<f32>,
     measured: Option<Measured>,
 }
 
-impl Source {
-    const fn word(self) -> &'static str {
+impl ZeroSource {
+    /// The word for it, for viewers.
+    pub const fn word(self) -> &'static str {
         match self {
             Self::RigFile => "rig file",
             Self::Reference => "reference",
@@ -50,15 +51,15 @@ impl Source {
 impl Zero {
     /// Takes up the rig file's baseline.
     #[expect(clippy::cast_possible_truncation, reason = "counts need no more than a float's digits")]
-    pub(crate) fn describe(&mut self, description: &pb::RigDescription) {
+    pub fn describe(&mut self, description: &pb::RigDescription) {
         self.rig_file = description.baseline_counts.iter().map(|&counts| counts as f32).collect();
     }
 
     /// Takes up the zero that a run has measured, if the event tells one.
-    pub(crate) fn on_event(&mut self, event: &pb::RunEvent) {
+    pub fn on_event(&mut self, event: &pb::RunEvent) {
         let (source, counts) = match &event.event {
-            Some(Event::ReferenceDone(done)) => (Source::Reference, &done.mean_counts),
-            Some(Event::TareDone(done)) => (Source::Tare, &done.baseline_counts),
+            Some(Event::ReferenceDone(done)) => (ZeroSource::Reference, &done.mean_counts),
+            Some(Event::TareDone(done)) => (ZeroSource::Tare, &done.baseline_counts),
             Some(_) | None => return,
         };
         self.measured = Some(Measured {
@@ -70,9 +71,9 @@ impl Zero {
     }
 
     /// Takes the mean of frames as the zero.
-    pub(crate) fn take(&mut self, counts: Vec<f32>, last: &pb::Frame) {
+    pub fn take(&mut self, counts: Vec<f32>, last: &pb::Frame) {
         self.measured = Some(Measured {
-            source: Source::Taken,
+            source: ZeroSource::Taken,
             counts,
             run_id: String::new(),
             t_wall_ns: last.t_wall_ns,
@@ -81,7 +82,7 @@ impl Zero {
 
     /// Looks at a frame: the zeros of a sensor that connected anew, or of a service that `has_restarted`, may be others. True if a
     /// zero is void now.
-    pub(crate) fn on_frame(&mut self, frame: &pb::Frame, has_restarted: bool) -> bool {
+    pub fn on_frame(&mut self, frame: &pb::Frame, has_restarted: bool) -> bool {
         let is_new = has_restarted || frame.flags & pb::FrameFlag::NewEpoch as u32 != 0;
         // A zero that is younger than the frame was told before it.
         let is_void = is_new && self.measured.as_ref().is_some_and(|zero| zero.t_wall_ns < frame.t_wall_ns);
@@ -91,14 +92,18 @@ impl Zero {
         is_void
     }
 
-    /// The reading of each element that counts as no load; empty if there is no zero at all.
-    #[cfg(feature = "foxglove")]
-    pub(crate) fn counts(&self) -> &[f32] {
+    /// The counts in force; empty if there is no zero at all.
+    pub fn counts(&self) -> &[f32] {
         self.measured.as_ref().map_or(&self.rig_file, |zero| &zero.counts)
     }
 
+    /// Where they come from.
+    pub fn source(&self) -> ZeroSource {
+        self.measured.as_ref().map_or(ZeroSource::RigFile, |zero| zero.source)
+    }
+
     /// JSON for the page; null if there is no zero at all.
-    pub(crate) fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         match &self.measured {
             Some(zero) => json!({
                 "counts": zero.counts,
@@ -109,7 +114,7 @@ impl Zero {
             None if self.rig_file.is_empty() => Value::Null,
             None => json!({
                 "counts": self.rig_file,
-                "source": Source::RigFile.word(),
+                "source": ZeroSource::RigFile.word(),
                 "run_id": "",
                 "t_wall_ms": null,
             }),
