@@ -29,18 +29,23 @@ fn it_uses_the_room_that_the_terminal_has_and_follows_its_size() {
         "depth ",
         "rise above zero",
         "log, UTC",
-        "started by",
+        " run: ",
         "presses",
     ];
     for size in [[80, 24], [120, 40], [200, 60], [80, 24]] {
         view.resize(size);
-        let screen = view.wait_for(&all);
+        let is_whole = |screen: &str| {
+            let last = usize::from(size[1]) - 1;
+            screen.lines().nth(last).is_some_and(|keys| keys.starts_with("q quit"))
+        };
+        let screen =
+            view.wait_until(|screen| is_whole(screen) && all.iter().all(|text| screen.contains(text)));
         assert!(!screen.contains("no room"), "{screen}");
         keep(&format!("watch-{}x{}", size[0], size[1]), &screen);
     }
     // It says what does not fit.
     view.resize([80, 18]);
-    keep("watch-80x18", &view.wait_for(&["no room for traces"]));
+    keep("watch-80x18", &view.wait_for(&["no room for log"]));
     view.resize([40, 10]);
     keep("watch-40x10", &view.wait_for(&["no room for"]));
     view.resize([80, 24]);
