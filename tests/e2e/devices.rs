@@ -36,7 +36,7 @@ fn what_a_rig_means_and_is_not_there_is_told() {
     fs::write(folder.path().join("tactusd.toml"), "rig = \"rig.toml\"\n").unwrap();
     for arguments in [["--rig", "rig.toml"], ["--config", "tactusd.toml"]] {
         let said = tactus(folder.path(), &[&["devices"], arguments.as_slice()].concat());
-        assert_eq!(said.code, Some(0), "{said:?}");
+        assert_eq!(said.code, Some(3), "{said:?}");
         assert!(said.out.contains("The sensor of rig \"sim\" is not there: usb:1209:ffff/none"), "{said:?}");
         assert!(said.out.contains("The stage of rig \"sim\" is simulated: it needs no device"), "{said:?}");
         let said = tactus(folder.path(), &[&["devices", "--json"], arguments.as_slice()].concat());
@@ -56,7 +56,7 @@ fn a_rig_is_named_by_its_name_too_and_one_that_is_not_there_is_an_error() {
     fs::create_dir_all(folder.path().join("mock")).unwrap();
     fs::write(folder.path().join("mock/sensor"), "").unwrap();
     let said = tactus(folder.path(), &["devices", "--rig", "bench"]);
-    assert_eq!(said.code, Some(0), "{said:?}");
+    assert_eq!(said.code, Some(3), "{said:?}");
     assert!(said.out.contains("The sensor of rig \"bench\" is there: mock/sensor"), "{said:?}");
     assert!(said.out.contains("The stage of rig \"bench\" is not there: mock/stage"), "{said:?}");
     let told = tactus(folder.path(), &["devices", "--rig", "bench", "--json"]).json();

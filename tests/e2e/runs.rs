@@ -59,6 +59,11 @@ fn runs_are_listed_marked_compared_and_made_again() {
     let same = compared(text(&again, "run_id"));
     assert_eq!((&same["differ"], &same["same"]["seed"][0]), (&serde_json::json!({}), &"1".into()), "{same}");
 
+    let there = done(tactus(&["--json", "runs", "--runs", "runs", "compare", first, second])).json();
+    assert_eq!(there["differ"]["seed"], serde_json::json!(["1", "2"]), "an option before the word");
+    let both = tactus(&["runs", "word", "compare", first, second]);
+    assert_eq!(both.code, Some(2), "{both:?}");
+
     let unknown = tactus(&["rerun", "nothing"]);
     assert_eq!(unknown.code, Some(2), "{unknown:?}");
     assert!(unknown.err.contains("`tactus runs` lists them"), "{unknown:?}");

@@ -329,7 +329,7 @@ pub(crate) struct StopArgs {
 
 /// Arguments of `runs`.
 #[derive(Debug, Clone, Args)]
-#[command(args_conflicts_with_subcommands = true)]
+#[command(subcommand_precedence_over_arg = true)]
 pub(crate) struct RunsArgs {
     /// Words to search for: in id, experiment, rig, person, date, status, message, tags and note. All must be there.
     pub(crate) words: Vec<String>,

@@ -22,7 +22,8 @@ pub(crate) fn devices(common: &Common, args: &DevicesArgs) -> anyhow::Result<Exi
     } else {
         print(&found, &rigs);
     }
-    Ok(Exit::Done)
+    let is_missing = rigs.presences(&found).iter().any(|(_, presence)| *presence == Presence::Missing);
+    Ok(if is_missing { Exit::Degraded } else { Exit::Done })
 }
 
 /// Folders searched for rig files if none is given.

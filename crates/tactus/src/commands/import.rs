@@ -9,7 +9,7 @@ use tactus_import::Summary;
 
 use crate::cli::{Common, ImportArgs};
 use crate::exit::{Exit, Failure};
-use crate::output::{print_fields, say};
+use crate::output::{print_fields, say, say_next};
 
 pub(crate) fn import(common: &Common, args: &ImportArgs) -> anyhow::Result<Exit> {
     match (&args.map, &args.new_map) {
@@ -38,6 +38,8 @@ fn propose(common: &Common, file: &Path, map: &Path) -> anyhow::Result<Exit> {
         say(&json!({ "map": map, "asked": asked }).to_string());
     } else {
         say(&format!("{}: complete its {asked} lines that begin with #?", map.display()));
+        let (file, map) = (file.display(), map.display());
+        say_next(&format!("`tactus import {file} --map {map}` makes the table"));
     }
     Ok(Exit::Done)
 }
@@ -59,6 +61,8 @@ fn told(common: &Common, summary: &Summary) -> Exit {
         for assumed in &summary.assumed {
             say(&format!("not in the mapping: {assumed}"));
         }
+        let table = summary.path.display();
+        say_next(&format!("`tactus calibrate {table}` or `tactus discover {table}` analyses it"));
     }
     if summary.warnings.is_empty() { Exit::Done } else { Exit::Degraded }
 }

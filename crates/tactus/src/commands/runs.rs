@@ -13,6 +13,10 @@ use crate::output::{duration, print_fields, print_table, say};
 
 pub(crate) fn runs(common: &Common, args: &RunsArgs) -> anyhow::Result<Exit> {
     let folder = &args.runs;
+    if args.command.is_some() && !(args.words.is_empty() && args.tag.is_empty()) {
+        let error = "words and --tag search the list: leave them out with tag, note and compare, or write `--` before words";
+        return Err(Failure::new(Exit::Usage, error).into());
+    }
     match &args.command {
         None => list(common, args),
         Some(RunsCommand::Tag { run, tags, remove }) => {

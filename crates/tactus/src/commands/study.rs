@@ -19,7 +19,7 @@ use tactus_report::study::{ComparedQuantity, StudyFigure, StudyReport, StudyRun,
 use super::calibrate::{self, Calibrated};
 use crate::cli::{Common, StudyArgs};
 use crate::exit::Exit;
-use crate::output::{self, duration, say};
+use crate::output::{self, duration, say, say_next};
 use steps::{CompletedStep, StudySteps};
 
 /// Figures computed from the model alone. Figures 2 and 5 come from the calibration, Figure 8 from the rig's images.
@@ -141,6 +141,11 @@ fn finish(
             say(&format!("missing: {missing}"));
         }
         say(&format!("{}\ndone in {}", report.display(), duration(start.elapsed().as_secs_f64())));
+        let model = args.out.join("calibration/model.toml");
+        if model.is_file() {
+            let model = model.display();
+            say_next(&format!("`tactus simulate --model {model}` shows an image of this sensor"));
+        }
     }
     Ok(if missing.is_empty() && !is_lossy { Exit::Done } else { Exit::Degraded })
 }
