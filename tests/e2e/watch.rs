@@ -47,7 +47,7 @@ fn it_uses_the_room_that_the_terminal_has_and_follows_its_size() {
     view.resize([80, 18]);
     keep("watch-80x18", &view.wait_for(&["no room for log"]));
     view.resize([40, 10]);
-    keep("watch-40x10", &view.wait_for(&["no room for"]));
+    keep("watch-40x10", &view.wait_for(&["no room for image"]));
     view.resize([80, 24]);
     view.wait_for(&all);
     // Traces of chosen elements: the cursor begins at element 0.
