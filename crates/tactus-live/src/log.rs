@@ -138,12 +138,11 @@ impl Log {
 
     /// JSON of the entries from a number on.
     pub fn json_from(&self, number: u64) -> Value {
-        self.entries.iter().filter(|entry| entry.number >= number).map(Entry::json).collect()
+        self.entries_from(number).map(Entry::json).collect()
     }
 
     /// The entries from a number on.
-    #[cfg(feature = "foxglove")]
-    pub(crate) fn entries_from(&self, number: u64) -> impl Iterator<Item = &Entry> {
+    pub fn entries_from(&self, number: u64) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(move |entry| entry.number >= number)
     }
 
