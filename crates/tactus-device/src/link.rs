@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use tactus_schema::{MonoTime, TimeStamp};
-use tactus_wire::declared::MAX_FRAME_BYTES;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::time::{sleep_until, timeout};
 
@@ -13,8 +12,8 @@ use crate::{Clock, DeviceError, ErrorKind};
 /// A device that does not accept a command within this time is taken as disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Size of a read: room for many frames, and for the longest packet in one piece.
-const BUFFER_BYTES: usize = MAX_FRAME_BYTES;
+/// Size of a read: room for many frames. Every link has one all the time.
+const BUFFER_BYTES: usize = 4096;
 
 /// An open link to a device.
 pub(crate) struct Link {
@@ -37,7 +36,7 @@ impl Link {
         Self { stream, buffer: vec![0; BUFFER_BYTES].into(), clock, device }
     }
 
-    /// The same link, with room for at least `bytes` in one read.
+    /// The same link, with room for at least `bytes` in one read: for packets, which come in one piece.
     pub(crate) fn reading_at_least(self, bytes: usize) -> Self {
         Self { buffer: vec![0; bytes.max(BUFFER_BYTES)].into(), ..self }
     }
