@@ -143,6 +143,12 @@ fn a_foreign_file_gives_the_model_of_the_original() {
     );
     assert!(said["assumed"].to_string().contains("rate_hz = 30.0"), "{said}");
     done(tactus(folder.path(), &["validate", "bench.parquet"]));
+    let validated = done(tactus(folder.path(), &["validate", "lab.toml"]));
+    assert!(validated.out.contains("a mapping for `tactus import`, 6 x 8 elements"), "{validated:?}");
+    fs::write(folder.path().join("wrong.toml"), MAPPING.replacen("unit = \"", "unit = \"x", 1)).unwrap();
+    let refused = tactus(folder.path(), &["validate", "wrong.toml"]);
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert!(refused.err.contains("unit"), "{refused:?}");
     let with_phases =
         MAPPING.replace("[rig]\n", "[phases]\ncolumn = \"state\"\npress = \"press\"\n\n[rig]\n");
     fs::write(folder.path().join("phases.toml"), with_phases).unwrap();

@@ -31,6 +31,7 @@ use rig::{CompleteRig, Sketch};
 use runs::Run;
 
 pub use error::ImportError;
+pub use mapping::SCHEMA;
 pub use propose::propose;
 
 /// Key of the table's metadata that says from what it was made.
@@ -69,6 +70,17 @@ pub struct RunSummary {
     pub idle: usize,
     /// Depth of the deepest frame.
     pub depth_max_mm: f64,
+}
+
+/// Checks a mapping without the files that it is for; returns the rows and columns of its array.
+///
+/// # Errors
+/// As [`import`], for what does not depend on a file.
+pub fn check(map: &Path) -> Result<[usize; 2], ImportError> {
+    let mapping = Mapping::read(map)?;
+    let shape @ [rows, cols] = Sketch::read(map, &mapping.rig)?.shape(map)?;
+    mapping.counts.columns.of_array(rows, cols).map_err(|wrong| wrong.in_file(map))?;
+    Ok(shape)
 }
 
 /// Writes the measurement table of a lab's files, run after run. Without a column of runs, each file is one, with the file's name.

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::ImportError;
 
 /// The schema's name in the file.
-pub(crate) const SCHEMA: &str = "tactus.mapping/1";
+pub const SCHEMA: &str = "tactus.mapping/1";
 
 /// Where the number of an element stands in the pattern of its column's name.
 pub(crate) const NUMBER: &str = "{n}";

@@ -104,12 +104,17 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
             Ok("hidden physics for a simulated rig".into())
         }
         Some(declared::SCHEMA) => Ok(link::in_words(&link::described(&text)?)),
+        Some(tactus_import::SCHEMA) => {
+            let [rows, cols] = tactus_import::check(file)?;
+            Ok(format!("a mapping for `tactus import`, {rows} x {cols} elements"))
+        }
         Some(other) => bail!(
-            "schema {other:?} is unknown; known are {}, {}, {}, {}, {HIDDEN_SCHEMA}",
+            "schema {other:?} is unknown; known are {}, {}, {}, {}, {}, {HIDDEN_SCHEMA}",
             rig::SCHEMA,
             model::SCHEMA,
             draft::SCHEMA,
-            declared::SCHEMA
+            declared::SCHEMA,
+            tactus_import::SCHEMA
         ),
         None => {
             let Rigs { served, refused, .. } = ServiceConfig::load(file)?.rigs;

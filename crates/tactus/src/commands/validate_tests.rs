@@ -40,6 +40,6 @@ fn rig_files_of_a_folder_are_checked_against_each_other() {
 fn an_unknown_schema_is_named() {
     assert_eq!(
         checked("# A later one.\n  schema='tactus.model/2' # the next\n").unwrap_err(),
-        r#"schema "tactus.model/2" is unknown; known are tactus.rig/1, tactus.model/1, tactus.draft/1, tactus.link/1, tactus.hidden/1"#
+        r#"schema "tactus.model/2" is unknown; known are tactus.rig/1, tactus.model/1, tactus.draft/1, tactus.link/1, tactus.mapping/1, tactus.hidden/1"#
     );
 }
