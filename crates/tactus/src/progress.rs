@@ -5,7 +5,7 @@ use std::mem;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use tactus_schema::pb::{RunPhase, RunState};
@@ -140,42 +140,38 @@ fn show(bar: &ProgressBar, state: &RunState) {
     });
 }
 
-/// Progress bar of a computation: share done, current step, time left. Hidden where [`RunProgress`] is.
+/// Progress bar of a computation: about what share is done, the time so far, the current step. How long the rest takes depends on what the
+/// data hold, and is not told. Hidden where [`RunProgress`] is.
 #[derive(Debug)]
 pub(crate) struct ComputationProgress {
     bar: ProgressBar,
-    start: Instant,
 }
 
 impl ComputationProgress {
     /// Resolution of the bar.
     const STEPS: u64 = 1000;
-    /// Below this share the time left is not shown: it would be a guess.
-    const SHARE_MIN: f64 = 0.02;
-
+    /// So that the time so far goes on in a long step.
+    const TICK: Duration = Duration::from_secs(1);
     pub(crate) fn new(silent: bool) -> Self {
         let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         // Cleared, too, when an error ends the computation.
         let bar =
             ProgressBar::with_draw_target(Some(Self::STEPS), target).with_finish(ProgressFinish::AndClear);
-        if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/dim} {percent:>3} %  {msg}") {
+        if let Ok(style) =
+            ProgressStyle::with_template("{bar:30.cyan/dim} {percent:>3} %  {elapsed:>4}  {msg}")
+        {
             bar.set_style(style);
         }
-        Self { bar, start: Instant::now() }
+        bar.enable_steady_tick(Self::TICK);
+        Self { bar }
     }
 
     /// Shows the current step and the share done, 0 to 1.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to STEPS")]
     pub(crate) fn show(&self, what: &str, share: f64) {
         let share = share.clamp(0.0, 1.0);
-        let left = if (Self::SHARE_MIN..1.0).contains(&share) {
-            let left_s = self.start.elapsed().as_secs_f64() * (1.0 - share) / share;
-            format!("  {} left", duration(left_s))
-        } else {
-            String::new()
-        };
         self.bar.set_position((share * Self::STEPS as f64) as u64);
-        self.bar.set_message(format!("{what}{left}"));
+        self.bar.set_message(what.to_owned());
     }
 
     /// Removes the bar.
