@@ -279,7 +279,9 @@ fn pass_on(
     let call = CommandCall { rig: rig.cloned(), command, request, reply: Responder { to } };
     calls.try_send(call).or_else(|refused| {
         let (call, error) = match refused {
-            TrySendError::Full(call) => (call, "too many commands are waiting; try again".to_owned()),
+            TrySendError::Full(call) => {
+                (call, format!("{} commands are waiting; try again", calls.max_capacity()))
+            }
             TrySendError::Closed(call) => (call, "the service is shutting down".to_owned()),
         };
         match call.reply.to {
