@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,10 +58,9 @@ def write(recording: Path, tags: Iterable[str], note: str) -> None:
 
 
 def _parsed(path: Path, text: str) -> dict[str, Any]:
-    try:
+    if sys.version_info >= (3, 11):
         import tomllib
-    except ImportError:
-        # Python before 3.11.
+    else:
         import tomli as tomllib
     try:
         return tomllib.loads(text)
