@@ -64,7 +64,8 @@ pub fn start(format: LogFormat, filter: &str) -> Log {
     start_with(format, filter, None)
 }
 
-/// As [`start`], with a listener. Lines do not show in which spans they are; the listener knows.
+/// As [`start`], with a listener. Lines show in which spans of the level ERROR they are, such as the rig among several; of the others only the
+/// listener knows.
 pub fn start_with(format: LogFormat, filter: &str, listener: Option<Listener>) -> Log {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(filter));
     // Not through the standard library's handle: its lock would be held while a line waits for its reader.
@@ -82,7 +83,9 @@ pub fn start_with(format: LogFormat, filter: &str, listener: Option<Listener>) -
         (LogFormat::Text, false) => lines.boxed(),
     };
     #[expect(clippy::redundant_closure_for_method_calls, reason = "the method alone is of one lifetime")]
-    let lines = lines.with_filter(filter_fn(|metadata| metadata.is_event())).boxed();
+    let lines = lines
+        .with_filter(filter_fn(|metadata| metadata.is_event() || *metadata.level() == Level::ERROR))
+        .boxed();
     let listeners: Vec<Listener> = listener.into_iter().chain([lines]).collect();
     let started = tracing_subscriber::registry().with(listeners).with(filter).try_init();
     if started.is_err() {
