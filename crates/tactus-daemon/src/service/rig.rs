@@ -152,7 +152,13 @@ impl Rig {
         let recordings = service.config.recordings_of(&self.name);
         let closing = {
             let recordings = recordings.clone();
-            tokio::task::spawn_blocking(move || crashed::close_all(&recordings))
+            tokio::task::spawn_blocking(move || {
+                // Clients look into it, and nobody waits for the first run to learn that there can be none.
+                if let Err(error) = fs::create_dir_all(&recordings) {
+                    error!("no run can be recorded: cannot make {}: {error}", recordings.display());
+                }
+                crashed::close_all(&recordings)
+            })
         };
         let RigFiles { rig, codec, .. } = RigFiles::clone(files);
         let clock = Clock::real();
