@@ -82,7 +82,6 @@ pub fn start_with(format: LogFormat, filter: &str, listener: Option<Listener>) -
         (LogFormat::Text, true) => lines.without_time().map_event_format(Ranked).boxed(),
         (LogFormat::Text, false) => lines.boxed(),
     };
-    #[expect(clippy::redundant_closure_for_method_calls, reason = "the method alone is of one lifetime")]
     let lines = lines
         .with_filter(filter_fn(|metadata| metadata.is_event() || *metadata.level() == Level::ERROR))
         .boxed();

@@ -6,12 +6,12 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use serde_json::{Value, json};
+use tactus_live::{Entry, Weight};
 use tactus_report::viewer::{Channel, ENCODING, Level, SCHEMAS, Scene, log_line, rig_in_words};
 use tactus_schema::{WallTime, pb};
 use tokio::sync::broadcast;
 
 use crate::board::Board;
-use crate::log::{Entry, Weight};
 use crate::metrics;
 
 /// Messages of all channels that a viewer may be behind: two seconds. Slower ones miss the oldest.

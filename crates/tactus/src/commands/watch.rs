@@ -188,6 +188,7 @@ fn keys() -> mpsc::Receiver<Typed> {
     keys
 }
 
+#[expect(clippy::wildcard_enum_match_arm, reason = "other keys mean nothing")]
 fn meant(key: KeyEvent) -> Option<Typed> {
     if key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL) {
         return Some(Typed::Quit);

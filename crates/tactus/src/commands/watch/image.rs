@@ -2,7 +2,7 @@
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::style::{Color, Modifier, Style, Stylize as _};
+use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Paragraph};
 
@@ -94,7 +94,7 @@ impl Image<'_> {
         let framed = |text: String| {
             let mut spans = vec![Span::raw(left), Span::raw(text), Span::raw(right)];
             if element == self.cursor {
-                spans = spans.into_iter().map(|span| span.bold()).collect();
+                spans = spans.into_iter().map(Stylize::bold).collect();
             }
             spans
         };

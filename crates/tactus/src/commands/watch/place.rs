@@ -49,7 +49,13 @@ impl Place<'_> {
         let Some(stage) = self.stage else { return vec!["unknown".into()] };
         let status = match stage.status() {
             pb::StageStatus::Unhomed => "not homed: `reset`".to_owned(),
-            other => other.word().to_owned(),
+            status @ (pb::StageStatus::Unspecified
+            | pb::StageStatus::Disconnected
+            | pb::StageStatus::Idle
+            | pb::StageStatus::Moving
+            | pb::StageStatus::Hold
+            | pb::StageStatus::Homing
+            | pb::StageStatus::Alarm) => status.word().to_owned(),
         };
         let mut lines = vec![Line::from(status)];
         let Some(rig) = self.rig else {

@@ -304,7 +304,7 @@ impl Screen {
             }
         };
         if let Some(health) = self.health.as_ref().filter(|health| !health.lease_holder.is_empty()) {
-            words += &format!("; {} holds the rig", health.lease_holder);
+            words = format!("{words}; {} holds the rig", health.lease_holder);
         }
         let mut lines = vec![Line::from(words)];
         if let Some(fault) = self.fault() {
