@@ -61,6 +61,8 @@ struct Stages {
     covering: Vec<Box<dyn OnCovering>>,
     element: Vec<Box<dyn OnElement>>,
     readout: Vec<Box<dyn OnReadout>>,
+    /// The last stage with an effect that remembers.
+    remember: Option<PipelineStage>,
 }
 
 /// The last contact and its signal at the elements.
@@ -167,8 +169,7 @@ impl Pipeline {
     /// step for both. Effects that act before the signal ([`Effect::acts_before_signal`]) take no part.
     pub fn step_on(&mut self, moment: Moment, contact: &Contact, signal_mm: &[f64]) -> &[f64] {
         let moment = self.elapse(moment);
-        self.pressed.contact.clone_from(contact);
-        self.signal_mm.copy_from_slice(signal_mm);
+        self.go_on_from(contact, signal_mm);
         self.cover(moment, |_| ());
         self.respond(moment)
     }
@@ -176,27 +177,33 @@ impl Pipeline {
     /// A step of which nobody wants the counts: only what the effects remember goes on. [`Pipeline::counts`] are then any.
     pub fn pass(&mut self, moment: Moment, path: &impl Path) {
         let moment = self.elapse(moment);
-        match self.stages.remember() {
-            None | Some(PipelineStage::Contact) => {}
-            Some(PipelineStage::Motion) => drop(self.place(moment, path)),
-            Some(PipelineStage::Covering) => {
-                self.press(moment, path);
-                self.cover(moment, |_| ());
-            }
-            Some(PipelineStage::Element | PipelineStage::Readout) => {
-                self.press(moment, path);
-                self.cover(moment, |_| ());
-                self.respond(moment);
-            }
+        if self.stages.remember == Some(PipelineStage::Motion) {
+            self.place(moment, path);
+        } else if self.stages.remember >= Some(PipelineStage::Covering) {
+            self.press(moment, path);
+            self.remember(moment);
         }
     }
 
     /// As [`Pipeline::pass`], from a contact and a signal of another pipeline.
     pub fn pass_on(&mut self, moment: Moment, contact: &Contact, signal_mm: &[f64]) {
-        if self.stages.remember() >= Some(PipelineStage::Covering) {
-            self.step_on(moment, contact, signal_mm);
-        } else {
-            self.elapse(moment);
+        let moment = self.elapse(moment);
+        if self.stages.remember >= Some(PipelineStage::Covering) {
+            self.go_on_from(contact, signal_mm);
+            self.remember(moment);
+        }
+    }
+
+    fn go_on_from(&mut self, contact: &Contact, signal_mm: &[f64]) {
+        self.pressed.contact.clone_from(contact);
+        self.signal_mm.copy_from_slice(signal_mm);
+    }
+
+    /// What follows the signal, as far as effects remember it.
+    fn remember(&mut self, moment: Elapsed) {
+        self.cover(moment, |_| ());
+        if self.stages.remember > Some(PipelineStage::Covering) {
+            self.respond(moment);
         }
     }
 
@@ -280,7 +287,7 @@ impl Pipeline {
 
     /// Clears the history of every effect, and the time.
     pub fn reset(&mut self) {
-        let Stages { motion, contact: _, covering, element, readout } = &mut self.stages;
+        let Stages { motion, contact: _, covering, element, readout, remember: _ } = &mut self.stages;
         for effect in motion {
             effect.reset();
         }
@@ -332,18 +339,6 @@ impl Pipeline {
 }
 
 impl Stages {
-    /// The last stage with an effect that remembers.
-    fn remember(&self) -> Option<PipelineStage> {
-        let Self { motion, contact: _, covering, element, readout } = self;
-        let stages = [
-            (PipelineStage::Readout, readout.iter().any(|effect| effect.remembers())),
-            (PipelineStage::Element, element.iter().any(|effect| effect.remembers())),
-            (PipelineStage::Covering, covering.iter().any(|effect| effect.remembers())),
-            (PipelineStage::Motion, motion.iter().any(|effect| effect.remembers())),
-        ];
-        stages.into_iter().find(|(_, remembers)| *remembers).map(|(stage, _)| stage)
-    }
-
     fn of(effects: &[Effect]) -> Self {
         let mut stages = Self::default();
         for effect in effects {
@@ -369,7 +364,19 @@ impl Stages {
                 }
             }
         }
+        stages.remember = stages.last_that_remembers();
         stages
+    }
+
+    fn last_that_remembers(&self) -> Option<PipelineStage> {
+        let Self { motion, contact: _, covering, element, readout, remember: _ } = self;
+        let stages = [
+            (PipelineStage::Readout, readout.iter().any(|effect| effect.remembers())),
+            (PipelineStage::Element, element.iter().any(|effect| effect.remembers())),
+            (PipelineStage::Covering, covering.iter().any(|effect| effect.remembers())),
+            (PipelineStage::Motion, motion.iter().any(|effect| effect.remembers())),
+        ];
+        stages.into_iter().find(|(_, remembers)| *remembers).map(|(stage, _)| stage)
     }
 }
 

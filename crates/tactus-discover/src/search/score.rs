@@ -25,7 +25,7 @@
 //! J. Hemerik, J. J. Goeman and L. Finos, *J. R. Stat. Soc. B* 82 (2020) 841 (sign-flipped scores); P. H. Westfall and
 //! S. S. Young, *Resampling-Based Multiple Testing* (1993), ch. 2 (the largest of many).
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVectorView};
 
 use crate::fit::Grams;
 use crate::numbers::{Rng, median, of_picked, parallel};
@@ -161,7 +161,10 @@ impl Score {
 
     /// Its value after a flip of the blocks' signs.
     fn flipped(&self, signs: &[f32]) -> f64 {
-        let square = |parts: &Vec<f32>| f64::from(dot(parts, signs)).powi(2);
+        let square = |parts: &Vec<f32>| {
+            let signs = DVectorView::from_slice(&signs[..parts.len()], parts.len());
+            f64::from(DVectorView::from_slice(parts, parts.len()).dot(&signs)).powi(2)
+        };
         let ChiSquare { times, freedom } = self.chi_square;
         deviate(self.parts.iter().map(square).sum::<f64>() / times, freedom)
     }
@@ -197,23 +200,6 @@ impl Score {
             chi_square,
         }
     }
-}
-
-/// Sums that go on side by side.
-const LANES: usize = 8;
-
-fn dot(one: &[f32], other: &[f32]) -> f32 {
-    let (ones, others) = (one.chunks_exact(LANES), other.chunks_exact(LANES));
-    let product = |(one, other): (&f32, &f32)| one * other;
-    let rest: f32 =
-        ones.remainder().iter().zip(&other[one.len() - ones.remainder().len()..]).map(product).sum();
-    let mut sums = [0.0; LANES];
-    for (one, other) in ones.zip(others) {
-        for ((sum, one), other) in sums.iter_mut().zip(one).zip(other) {
-            *sum += one * other;
-        }
-    }
-    sums.iter().sum::<f32>() + rest
 }
 
 /// A chi-square number on the scale of a standard normal deviate, not negative.
