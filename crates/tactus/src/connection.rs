@@ -75,8 +75,17 @@ pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
 
 /// The service, or `None` if nothing listens at the endpoint.
 pub(crate) async fn look(common: &Common) -> anyhow::Result<Option<Client>> {
+    found(connect(common).await?)
+}
+
+async fn connect(common: &Common) -> anyhow::Result<Result<Client, BusError>> {
     let endpoint = endpoint(common)?;
-    match Client::connect_as(&endpoint, common.rig.as_deref(), &common.credentials()).await {
+    Ok(Client::connect_as(&endpoint, common.rig.as_deref(), &common.credentials()).await)
+}
+
+/// What was found, with errors that say what to do.
+fn found(connected: Result<Client, BusError>) -> anyhow::Result<Option<Client>> {
+    match connected {
         Ok(client) => Ok(Some(client)),
         Err(BusError::NoService { .. }) => Ok(None),
         Err(BusError::SeveralRigs { endpoint, rigs }) => {
@@ -105,7 +114,19 @@ fn choose(endpoint: &str, rigs: &[String]) -> String {
 /// # Errors
 /// If nothing listens at the endpoint.
 pub(crate) async fn require(common: &Common) -> anyhow::Result<Client> {
-    look(common).await?.with_context(|| {
+    required(common, look(common).await?)
+}
+
+/// As [`require`], or `None` if the service has several rigs and none is named.
+pub(crate) async fn require_one_or_all(common: &Common) -> anyhow::Result<Option<Client>> {
+    match connect(common).await? {
+        Err(BusError::SeveralRigs { .. }) => Ok(None),
+        connected => required(common, found(connected)?).map(Some),
+    }
+}
+
+fn required(common: &Common, found: Option<Client>) -> anyhow::Result<Client> {
+    found.with_context(|| {
         format!(
             "no service at {}: start `tactusd --config FILE`, or give its address with --endpoint",
             common.endpoint

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use tactus_bus::{BusError, Client};
 use tactus_schema::key::Command;
 use tactus_schema::{pb, with_message};
 
@@ -19,31 +18,17 @@ const HOMING_PATIENCE: Duration = Duration::from_mins(2);
 pub(crate) fn status(common: &Common) -> anyhow::Result<Exit> {
     let request = pb::CommandRequest { who: connection::who(), ..Default::default() };
     connection::runtime()?.block_on(async {
-        if are_several(common).await? {
-            let (endpoint, credentials) = (connection::endpoint(common)?, common.credentials());
-            let asked = tactus_bus::ask_all(&endpoint, &credentials, Command::Status, &request, PATIENCE);
-            show_all(common, &asked.await?);
-        } else {
-            let client = connection::require(common).await?;
+        if let Some(client) = connection::require_one_or_all(common).await? {
             let reply = connection::ask(&client, Command::Status, &request, PATIENCE).await?;
             client.close().await?;
             show(common, &reply);
+        } else {
+            let (endpoint, credentials) = (connection::endpoint(common)?, common.credentials());
+            let asked = tactus_bus::ask_all(&endpoint, &credentials, Command::Status, &request, PATIENCE);
+            show_all(common, &asked.await?);
         }
         Ok(Exit::Done)
     })
-}
-
-/// True if none is named and the service has several.
-async fn are_several(common: &Common) -> anyhow::Result<bool> {
-    if common.rig.is_some() {
-        return Ok(false);
-    }
-    match Client::connect_as(&connection::endpoint(common)?, None, &common.credentials()).await {
-        Ok(client) => client.close().await.map(|()| false).map_err(Into::into),
-        Err(BusError::SeveralRigs { .. }) => Ok(true),
-        // Whoever connects next says what is wrong.
-        Err(_) => Ok(false),
-    }
 }
 
 fn show_all(common: &Common, answers: &[(String, Option<pb::CommandReply>)]) {
