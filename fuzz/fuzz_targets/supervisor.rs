@@ -240,6 +240,7 @@ impl Play {
             lost_before: 0,
             simulated: true,
             bad_elements: bad.into(),
+            temperature_c: None,
         };
         let violation = self.supervisor.on_frame(&frame);
         let is_read = |element: usize| !bad.iter().any(|bad| *bad as usize == element);

@@ -253,7 +253,17 @@ def test_the_tip_is_moved_above_an_element_and_a_step_aside(lab, dashboard):
     expect(page.locator("#stage")).to_contain_text(re.compile(r"x 23\.(89|90)\d"), timeout=PATIENCE_MS)
     expect(page.locator("#run")).to_contain_text("finished: done", timeout=PATIENCE_MS)
     expect(page.locator("#above")).to_have_attribute("aria-label", re.compile("inside the envelope"))
+    # Up by a step; down by more than is left goes to the safe height, and no further.
+    expect(page.locator("#jog-z-down")).to_be_disabled()
+    page.locator("#jog-z-up").click()
+    expect(page.locator("#stage")).to_contain_text(re.compile(r"idle, x 23\.(89|90)\d, y 17\.(89|90)\d, z 3\.000"), timeout=PATIENCE_MS)
+    expect(page.locator("#run")).to_contain_text("finished: done", timeout=PATIENCE_MS)
     page.keep("moved")
+    page.locator("#step").select_option("5")
+    page.locator("#jog-z-down").click()
+    expect(page.locator("#stage")).to_contain_text(re.compile(r"idle, x 23\.(89|90)\d, y 17\.(89|90)\d, z 2\.000"), timeout=PATIENCE_MS)
+    expect(page.locator("#run")).to_contain_text("finished: done", timeout=PATIENCE_MS)
+    expect(page.locator("#jog-z-down")).to_be_disabled()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

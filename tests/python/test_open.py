@@ -77,6 +77,29 @@ def test_the_frames_are_the_rows_of_the_export(runs, name, tmp_path):
     assert (run.rig, run.run_id) == (json.loads(table.schema.metadata[b"tactus.rig"]), table["run"][0].as_py())
 
 
+def test_the_temperature_is_the_one_of_the_sensor(tmp_path):
+    # The board of five magnetometers tells its temperature.
+    rig = (Path(__file__).parents[2] / "config/rigs/sim.toml").read_text()
+    for here, there in {
+        "rows = 6": "rows = 5",
+        "cols = 8": "cols = 3",
+        "[0.9, 2.9, 5.1, 7.1, 9.1, 11.1, 13.3, 15.3]": "[0.9, 2.9, 4.9]",
+        "[0.9, 2.9, 4.9, 6.9, 8.9, 10.9]": "[0.9, 2.9, 4.9, 6.9, 8.9]",
+        "miswired = ": "# ",
+        'protocol = "weiss-dsa"': 'protocol = "anyskin"',
+    }.items():
+        assert here in rig
+        rig = rig.replace(here, there)
+    (tmp_path / "board.toml").write_text(rig)
+    (tmp_path / "rest.star").write_text("def run(rig):\n    wait(1.0)\n")
+    made = tactus("run", "rest.star", "--rig-file", "board.toml", "--no-report", cwd=tmp_path)
+    recording = tmp_path / made["recording"]
+    tactus("export", recording, "--out", tmp_path / "table.parquet")
+    told = pq.read_table(tmp_path / "table.parquet")["temperature_c"].to_numpy()
+    assert (told == 25.0).all() and len(told) > 20
+    assert (tactus_client.open(recording).frames["temperature_c"].to_numpy() == told).all()
+
+
 @pytest.mark.parametrize("name", ALL)
 def test_the_metadata_is_that_of_record_info(runs, name):
     info = tactus("record", "info", runs[name], check=name in WHOLE)

@@ -121,6 +121,7 @@ impl Pulse {
             lost_before,
             simulated: true,
             bad_elements: [].into(),
+            temperature_c: None,
         });
     }
 

@@ -14,6 +14,7 @@ fn frame(at_ms: i64, count: f32, lost_before: u32) -> Frame {
         lost_before,
         simulated: true,
         bad_elements: [].into(),
+        temperature_c: None,
     }
 }
 

@@ -396,7 +396,7 @@ impl<'t> RowMaker<'t> {
             position_mm,
             covering_mm: timeline.covering_mm(at),
             indenter: timeline.indenter(),
-            temperature_c: None,
+            temperature_c: frame.temperature_c.map(f64::from),
             counts: &frame.counts,
         }))
     }

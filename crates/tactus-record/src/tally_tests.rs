@@ -21,6 +21,7 @@ fn frame(seq: u64, lost_before: u32) -> Frame {
         lost_before,
         simulated: true,
         bad_elements: [].into(),
+        temperature_c: None,
     }
 }
 

@@ -67,15 +67,35 @@ pub enum FigureError {
     },
 }
 
-/// A figure that [`draw_all`] has written, and the number written so far.
+/// A figure that is finished, and the number of those so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
     /// Title of the figure.
     pub title: &'static str,
-    /// Figures written so far, this one included.
-    pub written: usize,
-    /// Figures to write.
+    /// Figures finished so far, this one included.
+    pub finished: usize,
+    /// Figures to finish.
     pub figures: usize,
+}
+
+/// Tells the progress of figures that are drawn in parallel.
+struct Reporting<F> {
+    figures: usize,
+    /// Number of finished figures, and who is told.
+    told: Mutex<(usize, F)>,
+}
+
+impl<F: FnMut(Progress)> Reporting<F> {
+    fn new(figures: usize, progress: F) -> Self {
+        Self { figures, told: Mutex::new((0, progress)) }
+    }
+
+    fn finished(&self, title: &'static str) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let (finished, progress) = &mut *told;
+        *finished += 1;
+        progress(Progress { title, finished: *finished, figures: self.figures });
+    }
 }
 
 /// Computes the figures in parallel and writes each into `out_dir` as an SVG file, and all of them with captions as
@@ -94,14 +114,11 @@ pub fn draw_all(out_dir: &Path, progress: impl FnMut(Progress) + Send) -> Result
             Err(source) => Err(FigureError::Write { path, source }),
         }
     };
-    let reporting = Mutex::new((0, progress));
+    let reporting = Reporting::new(FIGURES.len(), progress);
     let draw = |figure: &PaperFigure| {
         let drawing = (figure.draw)()?;
         let path = write(&format!("figure-{}.svg", figure.number), drawing.sheet.to_string())?;
-        let mut reporting = reporting.lock().unwrap_or_else(PoisonError::into_inner);
-        let (written, progress) = &mut *reporting;
-        *written += 1;
-        progress(Progress { title: figure.title, written: *written, figures: FIGURES.len() });
+        reporting.finished(figure.title);
         Ok((path, drawing))
     };
     let drawn: Result<Vec<_>, FigureError> = FIGURES.par_iter().map(draw).collect();
@@ -112,13 +129,20 @@ pub fn draw_all(out_dir: &Path, progress: impl FnMut(Progress) + Send) -> Result
 
 /// Computes the figures with these numbers, such as `["3", "6a"]`, in parallel; unknown numbers are ignored.
 ///
+/// `progress` is called after each figure, in the order in which they finish.
+///
 /// # Errors
 /// If a figure's model is invalid; the shipped ones are valid.
-pub fn finished(numbers: &[&str]) -> Result<Vec<StudyFigure>, FigureError> {
+pub fn finished(
+    numbers: &[&str],
+    progress: impl FnMut(Progress) + Send,
+) -> Result<Vec<StudyFigure>, FigureError> {
     let find = |number: &&str| FIGURES.iter().find(|figure| figure.number == *number);
     let wanted: Vec<&PaperFigure> = numbers.iter().filter_map(find).collect();
+    let reporting = Reporting::new(wanted.len(), progress);
     let draw = |figure: &PaperFigure| {
         let drawing = (figure.draw)()?;
+        reporting.finished(figure.title);
         Ok(StudyFigure {
             number: figure.number.into(),
             title: figure.title.into(),

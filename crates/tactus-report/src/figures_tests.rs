@@ -15,7 +15,7 @@ fn every_figure_is_drawn_whole_and_loads_nothing() {
     let mut steps = Vec::new();
     let paths = draw_all(&dir.path().join("figures"), |step| steps.push(step)).unwrap();
     assert_eq!(steps.len(), 10);
-    let written: Vec<usize> = steps.iter().map(|step: &Progress| step.written).collect();
+    let written: Vec<usize> = steps.iter().map(|step: &Progress| step.finished).collect();
     assert_eq!(written, (1..=10).collect::<Vec<_>>());
     assert!(steps.iter().any(|step| step.title == "Wrench and spaceship" && step.figures == 10));
 

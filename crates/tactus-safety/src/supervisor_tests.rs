@@ -43,6 +43,7 @@ fn frame(ms: i64, counts: &[f32]) -> Frame {
         lost_before: 0,
         simulated: true,
         bad_elements: [].into(),
+        temperature_c: None,
     }
 }
 

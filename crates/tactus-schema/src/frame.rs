@@ -26,6 +26,8 @@ pub struct Frame {
     pub simulated: bool,
     /// Indices of elements that were not read, ascending; [`FrameFlags::BAD_ELEMENTS`] is set if there are any.
     pub bad_elements: Arc<[u32]>,
+    /// Temperature of the sensor in degrees Celsius, the mean where it has several; finite. `None` if it tells none.
+    pub temperature_c: Option<f32>,
 }
 
 /// Bits of [`pb::FrameFlag`].
@@ -67,6 +69,7 @@ impl From<&Frame> for pb::Frame {
             lost_before: frame.lost_before,
             simulated: frame.simulated,
             bad_elements: frame.bad_elements.to_vec(),
+            temperature_c: frame.temperature_c,
         }
     }
 }
@@ -86,6 +89,7 @@ impl From<pb::Frame> for Frame {
             lost_before: message.lost_before,
             simulated: message.simulated,
             bad_elements: message.bad_elements.into(),
+            temperature_c: message.temperature_c,
         }
     }
 }

@@ -55,6 +55,15 @@ function drift(counts, from) {
   return `mean ${(sum / Math.max(elements, 1)).toFixed(1)}, greatest ${most.toFixed(1)} counts at element ${at}`;
 }
 
+/** Of the sensor, now and over the frames that the page has. */
+function temperature() {
+  if (!lab.frame) return "?";
+  if (lab.frame.temperature_c === null) return "this sensor tells none";
+  const told = lab.frames.map((frame) => frame.temperature_c).filter((each) => each !== null && each !== undefined);
+  const [least, most] = [Math.min(...told), Math.max(...told)].map((each) => each.toFixed(1));
+  return `${lab.frame.temperature_c.toFixed(1)} °C, from ${least} to ${most} °C here`;
+}
+
 /** What the elements read at rest now; null while the tip may touch the covering. */
 function atRest() {
   const { description } = lab.rig;
@@ -77,7 +86,7 @@ export function Frames() {
     <dt>Frames</dt><dd id="frames">${lab.frame ? `number ${lab.frame.seq}` : "none"}${health && `, ${health.frame_rate_hz.toFixed(1)} Hz`}</dd>
     <dt>Interval</dt><dd id="interval">${step ? `${step.mean_ms.toFixed(1)} ms, at most ${step.most_ms.toFixed(1)} ms in the last 10 s` : "?"}</dd>
     <dt>Lost</dt><dd id="losses">${health ? `${health.frames_lost} at the device, ${health.frames_dropped_on_bus} on the bus` : "?"}${`, ${lab.frame?.missed ?? 0} at the dashboard, ${lab.missed} at this page`}</dd>
-    <dt>Temperature</dt><dd>not measured by this rig</dd>
+    <dt>Temperature</dt><dd id="temperature">${temperature()}</dd>
     <dt>Zero</dt><dd id="zero">${source ?? "none yet"}</dd>
     <dt>Drift of zeros</dt><dd id="drift">
       ${isMeasured && description && html`<div>zero against the rig file: ${drift(zero.counts, description.baseline_counts)}; allowed ${description.baseline_band_counts}</div>`}

@@ -168,7 +168,7 @@ export function Start({ draw }) {
   </form>`;
 }
 
-/** Moves of the tip at the safe height. Each is a short run of its own: checked, permitted and recorded like any other. */
+/** Moves of the tip at the safe height and above. Each is a short run of its own: checked, permitted and recorded like any other. */
 export function Move({ draw }) {
   const [step_mm, setStep] = useState(1);
   const [element, setElement] = useState("0");
@@ -177,21 +177,29 @@ export function Move({ draw }) {
   const why = obstacle();
   if (why || !rig || !stage) return html`<p class="note">${why || "The place of the tip is not known."}</p>`;
   const isOff = commands.busy !== "" || run?.is_running || run?.fault || stage.status !== "idle";
-  const go = (robot_mm, words) => {
+  const go = (robot_mm, words, height_mm) => {
     const [x_mm, y_mm] = toSensor(robot_mm, rig);
-    command("move", words, { body: { x_mm, y_mm }, patience_s: 310 });
+    command("move", words, { body: { x_mm, y_mm, height_mm }, patience_s: 310 });
   };
   const isInside = ([x, y]) => x >= rig.x_mm[0] && x <= rig.x_mm[1] && y >= rig.y_mm[0] && y <= rig.y_mm[1];
+  const button = (id, sign, words, isPossible, move) =>
+    html`<button id=${id} type="button" class="jog" aria-label=${words} title=${words} disabled=${isOff || !isPossible} onClick=${move}>${sign}</button>`;
   const jog = (id, dx, dy, sign, words) => {
     const to = [stage.x_mm + dx * step_mm, stage.y_mm + dy * step_mm];
-    return html`<button id=${id} type="button" class="jog" aria-label=${words} title=${words} disabled=${isOff || !isInside(to)} onClick=${() => go(to, `move ${words}`)}>${sign}</button>`;
+    return button(id, sign, words, isInside(to), () => go(to, `move ${words}`));
+  };
+  // Every run ends at the safe height or above it. What is left of a step is taken.
+  const jogZ = (id, dz, sign, words) => {
+    const height_mm = Math.min(Math.max(stage.z_mm + dz * step_mm, rig.safe_height_mm), rig.z_max_mm);
+    const here = [stage.x_mm, stage.y_mm];
+    return button(id, sign, words, isInside(here) && Math.abs(height_mm - stage.z_mm) > 0.0005, () => go(here, `move ${words}`, height_mm));
   };
   const cols = rig.col_centres_mm.length;
   const elements = cols * rig.row_centres_mm.length;
   const isElement = /^[0-9]+$/.test(element) && Number(element) < elements;
   const above = () => toRobot([rig.col_centres_mm[Number(element) % cols], rig.row_centres_mm[Math.floor(Number(element) / cols)]], rig);
   return html`<div id="move">
-    <div class="pad">${jog("jog-y-up", 0, 1, "↑", "y up")}${jog("jog-x-down", -1, 0, "←", "x down")}${jog("jog-x-up", 1, 0, "→", "x up")}${jog("jog-y-down", 0, -1, "↓", "y down")}</div>
+    <div class="pad">${jog("jog-y-up", 0, 1, "↑", "y up")}${jog("jog-x-down", -1, 0, "←", "x down")}${jog("jog-x-up", 1, 0, "→", "x up")}${jog("jog-y-down", 0, -1, "↓", "y down")}${jogZ("jog-z-up", 1, "⤒", "tip up")}${jogZ("jog-z-down", -1, "⤓", "tip down")}</div>
     <div class="controls">
       <label>Step <select id="step" value=${step_mm} onChange=${(event) => { setStep(Number(event.target.value)); draw(); }}>
         ${[0.1, 1, 5].map((step) => html`<option value=${step}>${step} mm</option>`)}</select></label>
@@ -201,7 +209,7 @@ export function Move({ draw }) {
     </div>
     <div class="controls"><button id="take-zero" type="button" disabled=${isOff} onClick=${() => command("zero", "take zero")}>Take zero</button>
       <span class="note">for all viewers, from the last half second</span></div>
-    <p class="note">The tip moves at the safe height, ${rig.safe_height_mm} mm; each move is a short run with a dry run and a recording. The service has no command to move it
-      down by hand: that is a press of an experiment.</p>
+    <p class="note">⤒ and ⤓ move the tip between the safe height, ${rig.safe_height_mm} mm, where sideways moves end, and ${rig.z_max_mm} mm. Each move is a short run with a dry run and
+      a recording. Below the safe height the tip goes only in a press of an experiment, and every run ends above it.</p>
   </div>`;
 }

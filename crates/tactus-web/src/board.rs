@@ -41,6 +41,7 @@ struct FrameView<'a> {
     lost_before: u32,
     missed: u64,
     tip_mm: Option<[f64; 3]>,
+    temperature_c: Option<f32>,
 }
 
 impl Board {
@@ -160,6 +161,7 @@ impl Board {
                 .as_ref()
                 .filter(|stage| !is_later(stage.t_mono_ns, frame, TIP_NS))
                 .map(|stage| [stage.x_mm, stage.y_mm, stage.z_mm]),
+            temperature_c: frame.temperature_c,
         })
         .ok()
     }

@@ -4,7 +4,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 use tactus_schema::pb;
 
-/// Name of the experiment that moves the tip to a place at the safe height.
+/// Name of the experiment that moves the tip to a place.
 const MOVE_TO: &str = "move-to";
 /// Longest name of who runs an experiment, in characters.
 const WHO_CHARS_MAX: usize = 60;
@@ -51,6 +51,8 @@ struct RunForm {
 struct MoveForm {
     x_mm: f64,
     y_mm: f64,
+    /// Height above the surface, not below the safe height; the safe height without.
+    height_mm: Option<f64>,
 }
 
 /// Body of `POST /resume`; may be empty.
@@ -122,10 +124,14 @@ pub(crate) fn name(who: &str) -> String {
     who.trim().chars().filter(|c| !c.is_control()).take(WHO_CHARS_MAX).collect()
 }
 
-fn move_to(MoveForm { x_mm, y_mm }: MoveForm) -> pb::RunRequest {
+fn move_to(MoveForm { x_mm, y_mm, height_mm }: MoveForm) -> pb::RunRequest {
+    let mut parameters = serde_json::json!({ "x_mm": x_mm, "y_mm": y_mm });
+    if let Some(height_mm) = height_mm {
+        parameters["height_mm"] = height_mm.into();
+    }
     pb::RunRequest {
         experiment: MOVE_TO.into(),
-        parameters_json: serde_json::json!({ "x_mm": x_mm, "y_mm": y_mm }).to_string(),
+        parameters_json: parameters.to_string(),
         ..Default::default()
     }
 }

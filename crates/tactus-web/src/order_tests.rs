@@ -38,13 +38,15 @@ fn what_is_no_form_is_refused_with_the_reason() {
 
 #[test]
 fn a_move_is_a_run_of_its_experiment() {
-    let Some(Ok(Order::Run(request))) = Order::of("move", br#"{"x_mm":1.5,"y_mm":-2}"#) else {
-        panic!("a move is a run")
-    };
-    assert_eq!(
-        (request.experiment.as_str(), request.parameters_json.as_str()),
-        ("move-to", r#"{"x_mm":1.5,"y_mm":-2.0}"#)
-    );
+    for (body, parameters) in [
+        (r#"{"x_mm":1.5,"y_mm":-2}"#, r#"{"x_mm":1.5,"y_mm":-2.0}"#),
+        (r#"{"x_mm":1.5,"y_mm":-2,"height_mm":0}"#, r#"{"height_mm":0.0,"x_mm":1.5,"y_mm":-2.0}"#),
+    ] {
+        let Some(Ok(Order::Run(request))) = Order::of("move", body.as_bytes()) else {
+            panic!("a move is a run")
+        };
+        assert_eq!((request.experiment.as_str(), request.parameters_json.as_str()), ("move-to", parameters));
+    }
     assert_eq!(
         Order::of("resume", br#"{"covering_mm":2.54}"#),
         Some(Ok(Order::Resume { covering_mm: Some(2.54) }))

@@ -46,13 +46,15 @@ const LINES_MAX: usize = 16;
 const LAST_DRAWING: Duration = Duration::from_millis(200);
 
 impl RunProgress {
-    pub(crate) fn new(silent: bool) -> Self {
+    /// `title` stands before the bar.
+    pub(crate) fn new(silent: bool, title: &str) -> Self {
         let next = Arc::<Next>::default();
         let (ended, drawing) = channel();
         let to_draw = Arc::clone(&next);
+        let title = title.to_owned();
         // Without a thread nothing is drawn, but the run goes on.
         let _spawned = thread::Builder::new().name("progress".into()).spawn(move || {
-            draw(&to_draw, silent);
+            draw(&to_draw, silent, title);
             drop(ended);
         });
         Self { next, drawing: Mutex::new(drawing) }
@@ -97,10 +99,10 @@ impl Next {
 }
 
 /// Draws until the run is over.
-fn draw(next: &Next, silent: bool) {
+fn draw(next: &Next, silent: bool, title: String) {
     let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-    let bar = ProgressBar::with_draw_target(None, target);
-    if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/dim} {pos}/{len} presses  {msg}") {
+    let bar = ProgressBar::with_draw_target(None, target).with_prefix(title);
+    if let Ok(style) = ProgressStyle::with_template("{prefix}{bar:30.cyan/dim} {pos}/{len} presses  {msg}") {
         bar.set_style(style);
     }
     loop {

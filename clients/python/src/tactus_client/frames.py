@@ -41,6 +41,8 @@ class Frame:
     shape: tuple[int, int] | None
     #: Indices of elements that were not read; ``counts`` holds their last reading, or 0.
     bad_elements: tuple[int, ...] = ()
+    #: Of the sensor in degrees Celsius; None if it tells none.
+    temperature_c: float | None = None
 
     @property
     def image(self) -> Any:
@@ -76,6 +78,7 @@ class Frame:
             simulated=message.simulated,
             shape=shape,
             bad_elements=tuple(message.bad_elements),
+            temperature_c=message.temperature_c if message.HasField("temperature_c") else None,
         )
 
 

@@ -357,7 +357,9 @@ class Recording:
         places = timeline.position_mm
         for axis, name in enumerate(("x_mm", "y_mm", "z_mm")):
             columns[name] = np.full(len(frames), np.nan) if places is None else places[:, axis]
-        return {**columns, "covering_mm": timeline.covering_mm(timeline.t_ns), "lost_before": frames["lost_before"]}
+        columns["covering_mm"] = timeline.covering_mm(timeline.t_ns)
+        columns["temperature_c"] = frames["temperature_c"].astype(float)
+        return {**columns, "lost_before": frames["lost_before"]}
 
     def _event_columns(self, events: list[Any]) -> dict[str, Any]:
         kinds = [event.WhichOneof("event") or "" for event in events]

@@ -47,6 +47,8 @@ FRAME_COLUMNS = np.dtype(
         ("lost_before", "u4"),
         ("simulated", "?"),
         ("tick_ns", "u8"),
+        # NaN if the sensor tells none.
+        ("temperature_c", "f4"),
     ]
 )
 STAGE_COLUMNS = np.dtype([("t_mono_ns", "i8"), ("x_mm", "f8"), ("y_mm", "f8"), ("z_mm", "f8"), ("status", "u1"), ("simulated", "?")])
@@ -245,6 +247,7 @@ class _Scan:
                 frame.lost_before,
                 frame.simulated,
                 self._tick_ns,
+                frame.temperature_c if frame.HasField("temperature_c") else np.nan,
             )
         )
         self._counts.append(counts)

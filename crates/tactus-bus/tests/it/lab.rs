@@ -110,6 +110,7 @@ pub(crate) fn frame(seq: u64) -> Frame {
         lost_before: 0,
         simulated: true,
         bad_elements: [].into(),
+        temperature_c: None,
     }
 }
 

@@ -95,6 +95,7 @@ async fn what_is_published_is_byte_for_byte_what_the_python_client_reads() {
         lost_before: 3,
         simulated: true,
         bad_elements: [].into(),
+        temperature_c: None,
     });
     let finished = pb::RunFinished {
         exit_status: pb::ExitStatus::Degraded.into(),

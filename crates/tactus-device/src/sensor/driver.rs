@@ -302,6 +302,7 @@ impl Driver {
             lost_before: placement.lost_before,
             simulated: self.expect.simulated,
             bad_elements: reading.bad.into(),
+            temperature_c: reading.temperature_c,
         };
         let gap = placement.gap.map(SensorEvent::Gap);
         for (permit, event) in room.zip(gap.into_iter().chain([SensorEvent::Frame(frame)])) {

@@ -99,6 +99,7 @@ impl Sensor for FakeSensor {
                     lost_before: lost,
                     simulated: true,
                     bad_elements: [].into(),
+                    temperature_c: None,
                 };
                 if lost == 0 {
                     return SensorEvent::Frame(frame);

@@ -121,6 +121,7 @@ impl Maker {
                 lost_before,
                 simulated: true,
                 bad_elements: [].into(),
+                temperature_c: None,
             });
             if lost_before > 0 {
                 let gap = pb::Gap {

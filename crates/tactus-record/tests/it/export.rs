@@ -157,6 +157,24 @@ fn elements_that_were_not_read_are_said() {
 }
 
 #[test]
+fn the_temperature_that_a_sensor_tells_is_in_the_table() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = Plan::short(1).make();
+    let path = dir.path().join("run.mcap");
+    let told = |seq: u64| (seq % 3 != 0).then_some(20.0 + seq as f32 / 64.0);
+    recorded_as(&run, &path, |fed| {
+        if let Fed::Frame(frame) = fed {
+            frame.temperature_c = told(frame.seq);
+        }
+        true
+    });
+    let (_, table) = exported(dir.path(), &[&path]);
+    let recorded: Vec<_> = table.rows().map(|row| row.temperature_c).collect();
+    let made: Vec<_> = run.frames().map(|frame| told(frame.seq).map(f64::from)).collect();
+    assert_eq!(recorded, made);
+}
+
+#[test]
 fn the_device_clock_begins_anew_with_each_connection() {
     let dir = tempfile::tempdir().unwrap();
     let run = Plan::short(2).make();

@@ -21,7 +21,8 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
     )
 }
 
-/// Such as `Faulty: elements 5 and 39 are dead and element 18 answers for 19.`; nothing without faults.
+/// Such as `Faulty: elements 5 and 39 are dead and element 18 answers for 19.`; nothing without faults. Those that only the fit found are
+/// among them.
 pub(super) fn in_words(found: &Discovery) -> Option<String> {
     let of = |what: &str, is: fn(FaultKind) -> bool| {
         let elements = found.faulty.iter().filter(|one| is(one.kind)).map(|one| one.element.to_string());
@@ -44,6 +45,13 @@ pub(super) fn in_words(found: &Discovery) -> Option<String> {
         }
         FaultKind::Dead | FaultKind::Stuck { .. } | FaultKind::Noisy { .. } => None,
     });
-    let all: Vec<String> = silent.into_iter().flatten().chain(crossed).collect();
+    let is_told = |element: f64| found.faulty.iter().any(|one| one.element as f64 == element);
+    let fitted = found.steps.iter().filter(|step| step.effect == "miswired").flat_map(|step| &step.terms);
+    let fitted = fitted.filter_map(|term| {
+        let of = |name: &str| term.iter().find(|one| one.name == name).map(|one| one.value);
+        let (element, answers_for) = (of("element").filter(|element| !is_told(*element))?, of("answers_for")?);
+        Some(format!("element {element} answers for {answers_for}"))
+    });
+    let all: Vec<String> = silent.into_iter().flatten().chain(crossed).chain(fitted).collect();
     (!all.is_empty()).then(|| format!("Faulty: {}.", list(all)))
 }

@@ -269,7 +269,7 @@ fn the_verdict_says_what_it_rests_on() {
         "The model was missing hysteresis and miswired. On held-out presses the residual falls from 9.36 to 2.08 counts rms, which \
          closes 99.6 % +- 0.4 % of the gap between model and noise; the noise is 2.00 counts, from repeats in time. Of readings with a signal, 0.29 \
          times the noise (0.57 counts) is not noise; with 95 % confidence it is at most 0.36 times the noise (0.71 counts). A structured \
-         residual of 2.50 counts was declared tolerable beforehand."
+         residual of 2.50 counts was declared tolerable beforehand. Faulty: element 18 answers for 19 and element 19 answers for 18."
     );
     assert_eq!(
         in_words(&nothing_missing()),
@@ -295,7 +295,9 @@ fn the_verdict_says_what_it_rests_on() {
         unexplained: Unexplained { depends_on: vec!["temperature"], gap: vec![], share: 0.3 },
         ..explained()
     };
-    assert!(in_words(&partly).ends_with("The remaining 30 % of the gap depends on temperature."));
+    assert!(in_words(&partly).ends_with(
+        "The remaining 30 % of the gap depends on temperature. Faulty: element 18 answers for 19 and element 19 answers for 18."
+    ));
 }
 
 #[test]
@@ -305,7 +307,7 @@ fn faulty_elements_are_listed_with_their_evidence_and_have_no_figure() {
         in_words(&discovery),
         "The model was missing miswired. On held-out presses the residual is 2.01 counts rms; the noise is 2.00 counts, from \
          repeats in time. Of readings with a signal, 0.10 times the noise (0.20 counts) is not noise; with 95 % confidence it is at most \
-         0.13 times the noise (0.25 counts). Faulty: elements 5 and 39 are dead, element 12 is stuck, element 30 is noisy and element 18 answers for 19."
+         0.13 times the noise (0.25 counts). Faulty: elements 5 and 39 are dead, element 12 is stuck, element 30 is noisy, element 18 answers for 19 and element 19 answers for 18."
     );
     let html = html(&discovery);
     show("faulty.html", &html);

@@ -44,6 +44,18 @@ impl DecodedFrame {
         Some(frame)
     }
 
+    /// Mean of the temperatures that are numbers.
+    pub fn temperature_c(&self) -> Option<f32> {
+        let (mut sum_c, mut told) = (0.0, 0.0);
+        for temperature_c in
+            self.magnetometers.iter().map(|one| one.temperature_c).filter(|one| one.is_finite())
+        {
+            sum_c += temperature_c;
+            told += 1.0;
+        }
+        (told > 0.0).then(|| sum_c / told)
+    }
+
     /// The frame as bytes.
     pub fn encode(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(FRAME_BYTES);

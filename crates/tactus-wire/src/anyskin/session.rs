@@ -35,6 +35,7 @@ impl Session {
             evidence: if damaged { LossEvidence::Damage } else { LossEvidence::TimesOnly },
             bad: (0..).zip(&counts).filter(is_bad).map(|(element, _)| element).collect(),
             counts,
+            temperature_c: frame.temperature_c(),
         }
     }
 

@@ -14,7 +14,14 @@ fn bytes(field_ut: [f32; 3]) -> Vec<u8> {
 
 fn reading(evidence: LossEvidence) -> Action {
     let counts = [1.5, -2.5, 3.0].repeat(5);
-    Action::Reading(Reading { tick: None, new_clock: false, evidence, counts, bad: vec![] })
+    Action::Reading(Reading {
+        tick: None,
+        new_clock: false,
+        evidence,
+        counts,
+        bad: vec![],
+        temperature_c: Some(25.0),
+    })
 }
 
 fn three_frames() -> Vec<u8> {
@@ -42,6 +49,15 @@ fn a_magnetometer_without_a_number_is_bad() {
     let [Action::Reading(reading)] = &actions[..] else { panic!("not a reading: {actions:?}") };
     assert_eq!(reading.bad, [0, 3, 6, 9, 12]);
     assert_eq!(reading.counts[1..3], [-5000.0, 1.0]);
+}
+
+#[test]
+fn the_temperature_is_the_mean_of_those_that_are_numbers() {
+    let magnetometers = [20.0, 22.0, f32::NAN, 30.0, f32::INFINITY]
+        .map(|temperature_c| Magnetometer { temperature_c, field_ut: [1.0; 3] });
+    assert_eq!(DecodedFrame { magnetometers }.temperature_c(), Some(24.0));
+    let magnetometers = [Magnetometer { temperature_c: f32::NAN, field_ut: [1.0; 3] }; 5];
+    assert_eq!(DecodedFrame { magnetometers }.temperature_c(), None);
 }
 
 #[test]

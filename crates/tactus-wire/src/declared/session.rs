@@ -124,6 +124,7 @@ impl sensor::Session for Session {
                 evidence: LossEvidence::TimesOnly,
                 counts: frame.counts.to_vec(),
                 bad: frame.bad.iter().filter_map(|element| u32::try_from(*element).ok()).collect(),
+                temperature_c: None,
             };
             let stats_before = core::mem::replace(last_stats, decoder.stats());
             // Bytes that were skipped before the first frame belonged to no frame of this connection.

@@ -62,6 +62,7 @@ fn ticks_become_nanoseconds_and_bad_elements_are_listed() {
         evidence: LossEvidence::TimesOnly,
         counts: vec![7.0, 65_535.0],
         bad: vec![1],
+        temperature_c: None,
     };
     assert_eq!(only_reading(actions), expected);
 }

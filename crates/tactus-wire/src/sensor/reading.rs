@@ -14,6 +14,8 @@ pub struct Reading {
     pub counts: Vec<f32>,
     /// Indices of the elements that were not read, ascending.
     pub bad: Vec<u32>,
+    /// Temperature of the sensor in degrees Celsius, the mean where it has several; finite. `None` if it tells none.
+    pub temperature_c: Option<f32>,
 }
 
 /// What the bytes since the previous reading show about missing readings.

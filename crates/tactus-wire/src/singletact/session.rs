@@ -353,6 +353,7 @@ impl Round {
             evidence: LossEvidence::Counted { lost, wrap: u64::MAX },
             counts,
             bad,
+            temperature_c: None,
         })
     }
 }

@@ -185,6 +185,7 @@ impl Session {
             evidence: LossEvidence::TimesOnly,
             counts: counts.into_iter().map(f32::from).collect(),
             bad: Vec::new(),
+            temperature_c: None,
         }));
         Ok(())
     }

@@ -66,6 +66,7 @@ fn reading(tick_ms: u64, new_clock: bool) -> Action {
         evidence: LossEvidence::TimesOnly,
         counts: vec![1.0, 2.0],
         bad: vec![],
+        temperature_c: None,
     })
 }
 

@@ -12,7 +12,7 @@ use tactus_schema::rig::{SerialPort, Transport};
 
 use crate::cli::{Common, DevicesArgs};
 use crate::exit::{Exit, Failure};
-use crate::output::{print_table, say};
+use crate::output::{print_table, say, say_next};
 
 pub(crate) fn devices(common: &Common, args: &DevicesArgs) -> anyhow::Result<Exit> {
     let rigs = Rigs::find(common.rig.as_deref(), args.config.as_deref())?;
@@ -211,6 +211,10 @@ fn print(found: &[FoundDevice], rigs: &Rigs) {
     }
     for note in &rigs.notes {
         eprintln!("tactus: {note}");
+    }
+    if found.iter().any(|one| rigs.using(one).next().is_none()) {
+        say("");
+        say_next("`tactus validate RIG.toml` checks a rig file with such a line");
     }
 }
 

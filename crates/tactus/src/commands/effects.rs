@@ -28,6 +28,7 @@ pub(crate) fn effects(common: &Common, args: &EffectsArgs) -> anyhow::Result<Exi
             let added = args.library.add(file)?;
             let name = &added.draft.draft.name;
             say(&format!("{}: every discovery tries {name} from now on", added.path.display()));
+            say_next("`tactus discover RUNS` tries it on recordings");
         }
         Some(EffectsCommand::Rename { name, to }) => rename(held, name, to)?,
         Some(EffectsCommand::Retire { name }) => {
@@ -85,6 +86,8 @@ fn show(common: &Common, held: &[Held], name: &str) -> anyhow::Result<()> {
         ("near twins", known.near_twins.join(", ")),
         ("shown by", known.shown_by.join(", ")),
     ]);
+    say("");
+    say_next("`tactus run diagnose` measures what may show it, `tactus discover RUNS` looks for it");
     Ok(())
 }
 
@@ -132,6 +135,13 @@ fn show_draft(one: &Held) {
         ));
     }
     print_fields(&fields);
+    if *status != DraftStatus::Retired {
+        say("");
+        say_next(&format!(
+            "`tactus discover RUNS` tries it, `tactus effects retire {}` ends that",
+            draft.name
+        ));
+    }
 }
 
 fn covariates(draft: &Draft) -> Vec<String> {

@@ -2,39 +2,30 @@
 
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 use tactus_report::figures;
 
 use crate::cli::{Common, FiguresArgs};
 use crate::exit::Exit;
-use crate::output::duration;
+use crate::output::{duration, say, say_next};
+use crate::progress::ComputationProgress;
 
 pub(crate) fn figures(common: &Common, args: &FiguresArgs) -> anyhow::Result<Exit> {
     let start = Instant::now();
-    let bar = bar(common.json);
-    let files = figures::draw_all(&args.out, |progress| {
-        bar.set_length(progress.figures as u64);
-        bar.set_position(progress.written as u64);
-        bar.set_message(progress.title);
+    let progress = ComputationProgress::new(common.json);
+    let files = figures::draw_all(&args.out, |drawn| {
+        progress.show(drawn.title, drawn.finished as f64 / drawn.figures as f64);
     })?;
-    bar.finish_and_clear();
+    progress.clear();
     if common.json {
-        println!("{}", json!({ "files": files, "simulated": true }));
-    } else {
-        for file in &files {
-            println!("{}", file.display());
-        }
-        eprintln!("computed from the model without a sensor in {}", duration(start.elapsed().as_secs_f64()));
+        say(&json!({ "files": files, "simulated": true }).to_string());
+        return Ok(Exit::Done);
     }
+    for file in &files {
+        say(&file.display().to_string());
+    }
+    say(&format!("computed from the model without a sensor in {}", duration(start.elapsed().as_secs_f64())));
+    let page = std::path::absolute(args.out.join("index.html"))?;
+    say_next(&format!("{} shows all of them with captions in a browser", page.display()));
     Ok(Exit::Done)
-}
-
-fn bar(silent: bool) -> ProgressBar {
-    let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-    let bar = ProgressBar::with_draw_target(None, target);
-    match ProgressStyle::with_template("{bar:30.cyan/dim} {pos}/{len} figures, {eta} left  {msg}") {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
 }

@@ -15,6 +15,7 @@ use crate::cli::{Common, RunArgs};
 use crate::connection;
 use crate::exit::{Exit, Failure, at_source, in_words};
 use crate::output::{duration, print_fields, say};
+use crate::progress::RunProgress;
 
 /// How a run ended.
 pub(super) struct RunSummary {
@@ -52,7 +53,7 @@ pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
 
 /// Runs, writes the report, and says how it ended.
 pub(super) fn run_subject(common: &Common, args: &RunArgs, subject: Subject) -> anyhow::Result<Exit> {
-    let summary = execute_at_source(common, args, subject)?;
+    let summary = execute_at_source(common, args, subject, None)?;
     let report = if args.no_report { None } else { make_report(&summary, &args.out) };
     if common.json {
         say(&to_json(&summary, report.as_deref()).to_string());
@@ -62,26 +63,38 @@ pub(super) fn run_subject(common: &Common, args: &RunArgs, subject: Subject) -> 
     Ok(Exit::of_run(summary.exit_status))
 }
 
-/// Runs the experiment, on the service if there is one, else embedded.
-pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<RunSummary> {
-    execute_at_source(common, args, Subject::of(args)?)
+/// Runs the experiment as a part of something greater, on the service if there is one, else embedded. A person sees its progress
+/// under the title `part`, and nothing else.
+pub(super) fn execute_part(common: &Common, args: &RunArgs, part: &str) -> anyhow::Result<RunSummary> {
+    execute_at_source(common, args, Subject::of(args)?, Some(part))
 }
 
 /// An error in the script is told with its line.
-fn execute_at_source(common: &Common, args: &RunArgs, subject: Subject) -> anyhow::Result<RunSummary> {
+fn execute_at_source(
+    common: &Common,
+    args: &RunArgs,
+    subject: Subject,
+    part: Option<&str>,
+) -> anyhow::Result<RunSummary> {
     let script = match &subject {
         Subject::Experiment { script, .. } => Some((script.name().to_owned(), script.source().to_owned())),
         Subject::Rest(_) => None,
     };
-    execute_subject(common, args, subject).map_err(|error| match &script {
+    let told = Told { is_silent: common.json, part };
+    execute_subject(common, args, subject, told).map_err(|error| match &script {
         Some((name, source)) => at_source(&error, name, source),
         None => error,
     })
 }
 
-fn execute_subject(common: &Common, args: &RunArgs, subject: Subject) -> anyhow::Result<RunSummary> {
+fn execute_subject(
+    common: &Common,
+    args: &RunArgs,
+    subject: Subject,
+    told: Told<'_>,
+) -> anyhow::Result<RunSummary> {
     if args.embedded || args.rig_file.is_some() {
-        return embedded::run(common, args, subject, "as asked");
+        return embedded::run(args, subject, "as asked", told);
     }
     let runtime = connection::runtime()?;
     match runtime.block_on(connection::find(common))? {
@@ -92,8 +105,27 @@ fn execute_subject(common: &Common, args: &RunArgs, subject: Subject) -> anyhow:
             );
             Err(Failure::new(Exit::Usage, error).into())
         }
-        Some(client) => runtime.block_on(served::run(client, common, args, subject)),
-        None => embedded::run(common, args, subject, &format!("no service at {}", common.endpoint)),
+        Some(client) => runtime.block_on(served::run(client, args, subject, told)),
+        None => embedded::run(args, subject, &format!("no service at {}", common.endpoint), told),
+    }
+}
+
+/// What a person is told while it runs.
+#[derive(Debug, Clone, Copy)]
+struct Told<'a> {
+    /// Nothing: a program reads.
+    is_silent: bool,
+    /// Only the progress, under this title.
+    part: Option<&'a str>,
+}
+
+impl Told<'_> {
+    fn has_words(self) -> bool {
+        !self.is_silent && self.part.is_none()
+    }
+
+    fn progress(self) -> RunProgress {
+        RunProgress::new(self.is_silent, &self.part.map_or_else(String::new, |part| format!("{part}  ")))
     }
 }
 

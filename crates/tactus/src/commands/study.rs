@@ -20,6 +20,7 @@ use super::calibrate::{self, Calibrated};
 use crate::cli::{Common, StudyArgs};
 use crate::exit::Exit;
 use crate::output::{self, duration, say, say_next};
+use crate::progress::ComputationProgress;
 use steps::{CompletedStep, StudySteps};
 
 /// Figures computed from the model alone. Figures 2 and 5 come from the calibration, Figure 8 from the rig's images.
@@ -30,15 +31,12 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     let mut steps = StudySteps::resume(common, args)?;
     let taken = steps.measure(common, args)?;
-    let tell = |what: &str| {
-        if !common.json {
-            say(what);
-        }
-    };
-    tell("calibration");
+    let progress = ComputationProgress::new(common.json);
+    progress.show("calibration", 0.0);
     let recordings: Vec<_> = taken.iter().map(|taken| taken.recording.clone()).collect();
     let calibrated = calibrate::from_files(&recordings)?;
     calibrate::write(&calibrated, &args.out.join("calibration"))?;
+    progress.clear();
     let truth = quantities::truth(&recordings[0])?;
     let mut missing = calibrated.calibration.missing.clone();
     let images = if taken.iter().all(|taken| taken.embedded) {
@@ -51,9 +49,13 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
         );
         None
     };
-    tell("mechanics, acuity, figures");
-    let mut figures = figures::finished(&FIGURES)?;
+    let progress = ComputationProgress::new(common.json);
+    let mut figures = figures::finished(&FIGURES, |drawn| {
+        progress.show(drawn.title, drawn.finished as f64 / (drawn.figures + 1) as f64);
+    })?;
+    progress.show("mechanics and acuity", FIGURES.len() as f64 / (FIGURES.len() + 1) as f64);
     let quantities = quantities::quantities(&calibrated, truth.as_ref(), images.as_ref())?;
+    progress.clear();
     figures.extend(images.into_iter().flat_map(|images| images.figures));
     let mut warnings: Vec<String> = taken.iter().filter_map(|taken| taken.degraded.clone()).collect();
     let is_lossy = calibrated.is_lossy || !warnings.is_empty();

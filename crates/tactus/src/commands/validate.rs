@@ -15,6 +15,7 @@ use tactus_wire::declared;
 use super::link;
 use crate::cli::{Common, ValidateArgs};
 use crate::exit::{Exit, in_words};
+use crate::output::say_next;
 
 pub(crate) fn validate(common: &Common, args: &ValidateArgs) -> Exit {
     let results: Vec<_> = args.files.iter().flat_map(|file| check_all(file)).collect();
@@ -35,7 +36,36 @@ pub(crate) fn validate(common: &Common, args: &ValidateArgs) -> Exit {
             .collect();
         println!("{}", json!({ "files": files }));
     }
+    if let [(file, Ok(_))] = &results[..]
+        && !common.json
+        && let Some(next) = next_command(file)
+    {
+        say_next(&next);
+    }
     if results.iter().all(|(_, result)| result.is_ok()) { Exit::Done } else { Exit::Failed }
+}
+
+/// What a person is likely to do with a valid file.
+fn next_command(file: &Path) -> Option<String> {
+    let path = file.display();
+    Some(match file.extension()?.to_str()? {
+        "star" => format!("`tactus plan {path}` dry-runs it"),
+        "parquet" => format!("`tactus calibrate {path}` fits the sensor to it"),
+        "mcap" => format!("`tactus report {path}` shows the run"),
+        _ => match schema(&std::fs::read_to_string(file).ok()?) {
+            Some(rig::SCHEMA) => {
+                format!("`tactus plan element-centres --rig-file {path}` dry-runs an experiment on it")
+            }
+            Some(model::SCHEMA) => format!("`tactus simulate --model {path}` shows an image of it"),
+            Some(draft::SCHEMA) => format!("`tactus effects add {path}` lets every discovery try it"),
+            Some(HIDDEN_SCHEMA) => {
+                format!("`tactus run diagnose --embedded --truth {path}` runs on such a rig")
+            }
+            Some(tactus_import::SCHEMA) => format!("`tactus import DATA --map {path}` reads data by it"),
+            None => format!("`tactusd --config {path}` serves it"),
+            Some(_) => return None,
+        },
+    })
 }
 
 /// The error in a file, without the file's name.

@@ -48,6 +48,7 @@ async fn stream(client: &Client) -> anyhow::Result<Exit> {
             "simulated": frame.simulated,
             "counts": frame.counts,
             "bad_elements": frame.bad_elements,
+            "temperature_c": frame.temperature_c,
         });
         // The reader closed the pipe.
         if writeln!(out, "{line}").and_then(|()| out.flush()).is_err() {

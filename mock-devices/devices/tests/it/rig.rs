@@ -307,6 +307,8 @@ async fn every_protocol_reads_the_same_world() {
         lab.fresh().await;
         let (frames, gaps) = lab.read(60).await;
         assert!(gaps.is_empty(), "{codec:?}: {gaps:?}");
+        let told_c = matches!(codec, SensorCodec::AnySkin).then_some(25.0);
+        assert!(frames.iter().all(|frame| frame.temperature_c == told_c), "{codec:?}: {:?}", frames[0]);
         assert!(
             frames.windows(2).all(|pair| pair[1].seq == pair[0].seq + 1 && pair[1].epoch == pair[0].epoch)
         );

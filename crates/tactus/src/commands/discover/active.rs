@@ -14,7 +14,7 @@ use tactus_schema::pb::ExitStatus;
 use super::settled::{self, Settled};
 use super::{Discovered, LiveRig};
 use crate::cli::{Common, DiscoverArgs, ExperimentArgs, LeaseArgs, RunArgs, RunSubject};
-use crate::commands::run::{RunSummary, execute};
+use crate::commands::run::{RunSummary, execute_part};
 use crate::connection;
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, say};
@@ -274,8 +274,7 @@ impl<'a> ExperimentRunner<'a> {
             no_report: true,
             lease: LeaseArgs::default(),
         };
-        // Suppresses the run's own first line.
-        let summary = execute(&Common { json: true, ..self.common.clone() }, &args)?;
+        let summary = execute_part(self.common, &args, &chosen.experiment)?;
         if !matches!(summary.exit_status, ExitStatus::Done | ExitStatus::Degraded) {
             bail!(Failure::new(Exit::of_run(summary.exit_status), format!("{command}: {}", summary.message)));
         }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tactus_engine::Engine;
 use tactus_plan::Evaluate;
@@ -19,8 +19,8 @@ use tactus_schema::pb::{self, RunPhase, RunState};
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::{RunSummary, Subject, taken_over_in_words};
-use crate::cli::{Common, RunArgs};
+use super::{RunSummary, Subject, Told, taken_over_in_words};
+use crate::cli::RunArgs;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::StopsRun;
 use crate::progress::RunProgress;
@@ -28,12 +28,7 @@ use crate::progress::RunProgress;
 /// How often the progress is drawn.
 const REDRAW: Duration = Duration::from_millis(100);
 
-pub(super) fn run(
-    common: &Common,
-    args: &RunArgs,
-    subject: Subject,
-    why: &str,
-) -> anyhow::Result<RunSummary> {
+pub(super) fn run(args: &RunArgs, subject: Subject, why: &str, told: Told<'_>) -> anyhow::Result<RunSummary> {
     let files = match &args.rig_file {
         Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?,
         None => embedded::simulated_rig()?,
@@ -45,14 +40,14 @@ pub(super) fn run(
     }
     let truth = args.truth.as_deref().map(read_truth).transpose()?;
     let pace = if args.real_time { Pace::Real } else { Pace::Virtual };
-    if !common.json {
+    if told.has_words() {
         let time = if args.real_time { "real time" } else { "virtual time" };
         let hidden = args.truth.as_ref().map(|path| format!("; true physics from {}", path.display()));
         let hidden = hidden.unwrap_or_default();
         println!("SIMULATED: running on the embedded simulated rig {:?} ({why}; {time}{hidden})", rig.name);
     }
     let simulated = rig.simulated;
-    let progress = Arc::new(RunProgress::new(common.json));
+    let progress = Arc::new(told.progress());
     let stops_run = StopsRun::prepare(Arc::clone(&progress))?;
     let mut attending = None;
     let stopped = StopsRun::is_asked;
@@ -60,10 +55,10 @@ pub(super) fn run(
     let taken_over = request.earlier.as_ref().map(|earlier| earlier.taken_over());
     let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, &stopped, |engine, order| {
         StopsRun::begin(engine.clone());
-        if let Some(taken) = taken_over.as_ref().filter(|_| !common.json) {
+        if let Some(taken) = taken_over.as_ref().filter(|_| told.has_words()) {
             progress.say(&taken_over_in_words(taken, order.planned.map_or(0, |planned| planned.presses)));
         }
-        attending = attend(engine, &progress);
+        attending = attend(engine, &progress, pace);
     });
     drop(stops_run);
     if let Some(attending) = attending {
@@ -165,18 +160,19 @@ fn wrong_truth(path: &Path, error: &TruthError) -> anyhow::Error {
 }
 
 /// Shows the progress of a run on a thread of its own until it is finished. The run may occupy the calling thread.
-fn attend(engine: &Engine, progress: &Arc<RunProgress>) -> Option<JoinHandle<()>> {
+fn attend(engine: &Engine, progress: &Arc<RunProgress>, pace: Pace) -> Option<JoinHandle<()>> {
     let (state, progress) = (engine.state(), Arc::clone(progress));
     // Without a thread there is no progress, but the run goes on.
     let spawned = thread::Builder::new().name("attend".into()).spawn(move || {
         if let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() {
-            runtime.block_on(follow(state, &progress));
+            runtime.block_on(follow(state, &progress, pace));
         }
     });
     spawned.ok()
 }
 
-async fn follow(state: watch::Receiver<RunState>, progress: &RunProgress) {
+async fn follow(state: watch::Receiver<RunState>, progress: &RunProgress, pace: Pace) {
+    let mut pacing = Pacing::default();
     let mut redraw = interval(REDRAW);
     redraw.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut ended = state.clone();
@@ -186,9 +182,35 @@ async fn follow(state: watch::Receiver<RunState>, progress: &RunProgress) {
             // The engine's end ends it, too.
             _ = ended.wait_for(|state| state.phase() == RunPhase::Finished) => return,
             _ = redraw.tick() => {
-                let now = state.borrow().clone();
+                let mut now = state.borrow().clone();
+                if pace == Pace::Virtual {
+                    now.remaining_s = pacing.left_s(now.remaining_s, Instant::now());
+                }
                 progress.show(&now);
             }
         }
     }
 }
+
+/// The time that is left of a run in virtual time, for a person who waits: from how fast it went so far.
+#[derive(Debug, Default)]
+struct Pacing {
+    /// When the time left was first known, and how long it was then in the rig's time.
+    began: Option<(Instant, f64)>,
+}
+
+impl Pacing {
+    /// In s; below zero while it is not known.
+    fn left_s(&mut self, remaining_s: f64, now: Instant) -> f64 {
+        if remaining_s < 0.0 {
+            return remaining_s;
+        }
+        let (began, first_s) = *self.began.get_or_insert((now, remaining_s));
+        let done_s = first_s - remaining_s;
+        if done_s > 0.0 { (now - began).as_secs_f64() * remaining_s / done_s } else { -1.0 }
+    }
+}
+
+#[cfg(test)]
+#[path = "embedded_tests.rs"]
+mod tests;

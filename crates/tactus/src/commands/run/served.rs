@@ -9,22 +9,21 @@ use tactus_schema::key::Command;
 use tactus_schema::pb::{self, RunPhase, RunState};
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::{RunSummary, Subject, taken_over_in_words};
-use crate::cli::{Common, RunArgs};
+use super::{RunSummary, Subject, Told, taken_over_in_words};
+use crate::cli::RunArgs;
 use crate::connection::{self, PATIENCE};
 use crate::exit::in_words;
-use crate::progress::RunProgress;
 
 /// How long the dry run may take before the service answers.
 const DRY_RUN_PATIENCE: Duration = Duration::from_mins(5);
 
 pub(super) async fn run(
     client: Client,
-    common: &Common,
     args: &RunArgs,
     subject: Subject,
+    told: Told<'_>,
 ) -> anyhow::Result<RunSummary> {
-    if !common.json {
+    if told.has_words() {
         println!("running on the service at {} (rig {:?})", client.endpoint(), client.rig());
     }
     let mut states = client.subscribe::<RunState>(History::Last).await?;
@@ -41,11 +40,11 @@ pub(super) async fn run(
     if !reply.note.is_empty() {
         eprintln!("tactus: {}", reply.note);
     }
-    if let Some(taken) = accepted.taken_over.as_ref().filter(|_| !common.json) {
+    if let Some(taken) = accepted.taken_over.as_ref().filter(|_| told.has_words()) {
         println!("{}", taken_over_in_words(taken, accepted.presses_planned));
     }
 
-    let progress = RunProgress::new(common.json);
+    let progress = told.progress();
     let mut alive = client.alive();
     let mut interrupts = signal(SignalKind::interrupt())?;
     let mut held = Some(held);

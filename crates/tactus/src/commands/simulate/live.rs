@@ -237,6 +237,7 @@ impl SimulatedSensor {
             lost_before,
             simulated: true,
             bad_elements: [].into(),
+            temperature_c: None,
         }
     }
 

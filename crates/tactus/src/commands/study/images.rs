@@ -43,6 +43,7 @@ pub(super) fn take(
     if calibrated.model().is_none() {
         return Ok(None);
     }
+    steps.begin_part(ANGLES_DEG.len() + 1);
     let mut angles = Vec::new();
     for angle_deg in ANGLES_DEG {
         let heading = format!("{angle_deg}\u{b0}");

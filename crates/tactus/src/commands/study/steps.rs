@@ -11,7 +11,7 @@ use tactus_report::study::StudyRun;
 use tactus_schema::pb::ExitStatus;
 
 use crate::cli::{Common, ExperimentArgs, LeaseArgs, RunArgs, RunSubject, StudyArgs};
-use crate::commands::run::execute;
+use crate::commands::run::execute_part;
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, say};
 use crate::sha256;
@@ -35,6 +35,9 @@ pub(super) struct StudySteps {
     taken: Vec<CompletedStep>,
     #[serde(skip)]
     path: PathBuf,
+    /// Steps of the present part of the study that are done, and all of them.
+    #[serde(skip)]
+    part: [usize; 2],
 }
 
 /// A completed run.
@@ -88,6 +91,7 @@ impl StudySteps {
             truth: args.truth.as_deref().map(sha256::of_file).transpose()?,
             taken: Vec::new(),
             path: path.clone(),
+            part: [0, 0],
         };
         if !path.exists() {
             return Ok(new);
@@ -132,7 +136,13 @@ impl StudySteps {
             ],
             ..plain(&format!("sweep, {thickness_mm} mm"), "grid-sweep")
         }));
+        self.begin_part(steps.len());
         steps.iter().map(|step| self.take(common, args, step)).collect()
+    }
+
+    /// So many steps are to be taken now; their progress is told as a part of these.
+    pub(super) fn begin_part(&mut self, steps: usize) {
+        self.part = [0, steps];
     }
 
     /// Runs a step, unless it is completed.
@@ -142,6 +152,7 @@ impl StudySteps {
         args: &StudyArgs,
         step: &StudyStep,
     ) -> anyhow::Result<CompletedStep> {
+        self.part[0] += 1;
         let known = self.taken.iter().find(|taken| taken.step == step.name && taken.recording.is_file());
         if let Some(known) = known {
             if !common.json {
@@ -150,9 +161,8 @@ impl StudySteps {
             return Ok(known.clone());
         }
         let rig_file = step.rig_file.as_ref().or(args.rig_file.as_ref());
-        let summary = execute(
-            // Suppresses the run's own first line.
-            &Common { json: true, ..common.clone() },
+        let summary = execute_part(
+            common,
             &RunArgs {
                 subject: RunSubject::from(ExperimentArgs {
                     experiment: step.experiment.into(),
@@ -168,6 +178,7 @@ impl StudySteps {
                 no_report: true,
                 lease: LeaseArgs::default(),
             },
+            &format!("{} of {}, {}", self.part[0], self.part[1], step.name),
         )
         .with_context(|| format!("step {:?}", step.name))?;
         if !matches!(summary.exit_status, ExitStatus::Done | ExitStatus::Degraded) {

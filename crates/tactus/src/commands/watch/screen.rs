@@ -264,6 +264,9 @@ impl Screen {
         if let Some([least_s, greatest_s]) = intervals_s(&self.history) {
             spans.push(Span::raw(format!("  {:.0} to {:.0} ms", least_s * 1e3, greatest_s * 1e3)));
         }
+        if let Some(temperature_c) = self.frame.as_ref().and_then(|frame| frame.temperature_c) {
+            spans.push(Span::raw(format!("  {temperature_c:.1} \u{b0}C")));
+        }
         Line::from(spans)
     }
 
