@@ -31,8 +31,8 @@ use zenoh::Session;
 const RATE_HZ: f64 = 30.0;
 /// Only a hang takes this long.
 const PATIENCE: Duration = Duration::from_mins(5);
-/// The experiment of every run: it reads for as long as the measurement lasts.
-const SCRIPT: &str = "def run(rig):\n    tare()\n    wait(3600.0)\n";
+/// A run waits for this long for each rig that starts after its own. Its dry run computes every frame of it, and so must not be much longer.
+const START_S: f64 = 0.5;
 
 /// What is measured.
 #[derive(Debug, Clone)]
@@ -118,7 +118,7 @@ impl RigsTrial {
         all_ready(&session, &names, &mut service).await?;
         if self.is_recording {
             for name in &names {
-                start_run(&service.endpoint, name).await.with_context(|| format!("rig {name}"))?;
+                start_run(&service.endpoint, name, &self.script()).await.with_context(|| format!("rig {name}"))?;
             }
         }
         let (seen, is_counting) =
@@ -159,6 +159,12 @@ impl RigsTrial {
             memory_kib,
             threads,
         })
+    }
+
+    /// The experiment of every run: it reads for as long as the measurement lasts.
+    fn script(&self) -> String {
+        let seconds = 60.0 + 2.0 * self.time.as_secs_f64() + START_S * self.rigs as f64;
+        format!("def run(rig):\n    tare()\n    wait({seconds:.1})\n")
     }
 
     fn start(&self, folder: tempfile::TempDir) -> Result<Service> {
@@ -274,7 +280,7 @@ async fn all_ready(session: &Session, names: &[String], service: &mut Service) -
 }
 
 /// Resets a rig and starts a run on it.
-async fn start_run(endpoint: &Endpoint, rig: &str) -> Result<()> {
+async fn start_run(endpoint: &Endpoint, rig: &str, script: &str) -> Result<()> {
     let client = Client::connect(endpoint, Some(rig)).await?;
     let held = match client.hold("bench", None).await? {
         Hold::Held(held) => held,
@@ -286,7 +292,7 @@ async fn start_run(endpoint: &Endpoint, rig: &str) -> Result<()> {
     ensure!(reply.ok, "{}", reply.error);
     let request = pb::RunRequest {
         experiment: "reads".into(),
-        script: SCRIPT.into(),
+        script: script.to_owned(),
         who,
         lease,
         ..Default::default()

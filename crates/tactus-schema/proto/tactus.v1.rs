@@ -21,6 +21,8 @@ pub struct Frame {
     pub simulated: bool,
     #[prost(uint32, repeated, tag = "10")]
     pub bad_elements: ::prost::alloc::vec::Vec<u32>,
+    #[prost(float, optional, tag = "11")]
+    pub temperature_c: ::core::option::Option<f32>,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct SensorInfo {

@@ -85,7 +85,8 @@ class Frame(Message):
     lost_before: int
     simulated: bool
     bad_elements: Sequence[int]
-    def __init__(self, *, seq: int | None = ..., epoch: int | None = ..., device_tick: int | None = ..., t_mono_ns: int | None = ..., t_wall_ns: int | None = ..., counts: Iterable[float] | None = ..., flags: int | None = ..., lost_before: int | None = ..., simulated: bool | None = ..., bad_elements: Iterable[int] | None = ...) -> None: ...
+    temperature_c: float
+    def __init__(self, *, seq: int | None = ..., epoch: int | None = ..., device_tick: int | None = ..., t_mono_ns: int | None = ..., t_wall_ns: int | None = ..., counts: Iterable[float] | None = ..., flags: int | None = ..., lost_before: int | None = ..., simulated: bool | None = ..., bad_elements: Iterable[int] | None = ..., temperature_c: float | None = ...) -> None: ...
 
 class Gap(Message):
     frames_lost: int
