@@ -118,7 +118,9 @@ impl RigsTrial {
         all_ready(&session, &names, &mut service).await?;
         if self.is_recording {
             for name in &names {
-                start_run(&service.endpoint, name, &self.script()).await.with_context(|| format!("rig {name}"))?;
+                start_run(&service.endpoint, name, &self.script())
+                    .await
+                    .with_context(|| format!("rig {name}"))?;
             }
         }
         let (seen, is_counting) =
