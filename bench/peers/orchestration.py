@@ -2,7 +2,7 @@
 
 Tactus plans, checks against the envelope, moves in confirmed steps, simulates the covering and 30 frames per second, supervises and
 records. bluesky's `grid_scan` sets two simulated axes without delay, reads one detector, and hands documents to one subscriber, which
-counts them. So one point of bluesky stands beside one press. `tactus plan` is the script alone, without devices and physics.
+counts them. So one point of bluesky stands beside one press. `tactus plan` is the dry run alone, on the rig's twin.
 """
 
 import argparse
