@@ -143,7 +143,7 @@ fn devices_that_die_harm_no_other_rig_and_are_found_again() {
     let mut seen = [&mut left, &mut right].map(|frames_of| runtime.block_on(frames(frames_of, FRAMES)));
 
     middle.kill();
-    daemon.wait_until(|line| line.contains("middle") && line.contains("sensor lost"));
+    daemon.wait_until(|line| line.contains("rig{name=\"middle\"}") && line.contains("sensor lost"));
     for (seqs, frames_of) in seen.iter_mut().zip([&mut left, &mut right]) {
         seqs.extend(runtime.block_on(frames(frames_of, FRAMES)));
         assert_unbroken(seqs);

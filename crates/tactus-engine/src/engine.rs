@@ -351,9 +351,9 @@ impl Engine {
         let claim = self.claim()?;
         let shared = Arc::clone(&self.shared);
         // A task of its own: it ends properly even if the caller gives up, and its panic is not the caller's.
-        let resetting = tokio::spawn(async move {
+        let resetting = async move {
             let steps = Arc::clone(&shared);
-            let task = tokio::spawn(async move { steps.reset().await });
+            let task = tokio::spawn(async move { steps.reset().await }.in_current_span());
             let done = match task.await {
                 Ok(done) => done,
                 Err(panic) => {
@@ -372,7 +372,8 @@ impl Engine {
                 .await?;
             drop(claim);
             done
-        });
+        };
+        let resetting = tokio::spawn(resetting.in_current_span());
         resetting.await.unwrap_or_else(|panic| Err(ResetError::NotReady(panic.to_string())))
     }
 
@@ -600,7 +601,7 @@ impl Claim {
         let (run_id, experiment) = (order.run_id.clone(), order.script.name().to_owned());
         let span = info_span!("run", run_id, experiment, exit_status = field::Empty, presses = field::Empty);
         // A task of its own, watched by another: neither a panic of the run nor an impatient caller leaves the tip.
-        let run = tokio::spawn(async move {
+        let run = async move {
             let shared = Arc::clone(&self.0);
             let run = tokio::spawn(Run::execute(Arc::clone(&shared), order.clone(), record).instrument(span));
             let outcome = match run.await {
@@ -609,7 +610,8 @@ impl Claim {
             };
             self.finish(&outcome);
             outcome
-        });
+        };
+        let run = tokio::spawn(run.in_current_span());
         run.await.unwrap_or_else(|panic| RunOutcome::defect(run_id, experiment, panic.to_string()))
     }
 

@@ -9,6 +9,7 @@ use tactus_schema::{DeviceTick, Frame, FrameFlags, Rig, TimeStamp, pb};
 use tactus_wire::sensor::{Action, Cause, Loss, Reading, Session};
 use tokio::sync::mpsc;
 use tokio::time::sleep;
+use tracing::Instrument as _;
 
 use super::sequence::{GapCause, ReceivedFrame, Sequence};
 use super::{Sensor, SensorCodec, SensorEvent};
@@ -72,7 +73,8 @@ impl SensorDriver {
             reported_loss: None,
             dropped: 0,
         };
-        tokio::spawn(driver.run());
+        // Its log says of which rig it is.
+        tokio::spawn(driver.run().in_current_span());
         Self { events }
     }
 }

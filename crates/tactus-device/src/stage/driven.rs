@@ -10,6 +10,7 @@ use tactus_schema::{MonoTime, pb};
 use tactus_wire::stage::{Controller, Session};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
+use tracing::Instrument as _;
 
 use super::driver::{CommandRequest, Driver, Progress, StageCommand};
 use super::guard::{Guard, Heartbeat};
@@ -131,7 +132,8 @@ impl DrivenStage {
             guard,
             progress: Progress::default(),
         };
-        tokio::spawn(driver.run());
+        // Its log says of which rig it is.
+        tokio::spawn(driver.run().in_current_span());
         (
             Arc::new(Self { device, requests: sender, stop, watched, heartbeat, state, connection }),
             all_reports,

@@ -79,8 +79,9 @@ impl Guard {
     /// A device was opened. `writer` is a second way to it, if it has one.
     pub(super) fn open(&mut self, writer: Option<Box<dyn Write + Send>>) {
         if writer.is_some() && !self.has_thread {
-            let shared = Arc::clone(&self.shared);
-            match thread::Builder::new().name("stage-guard".into()).spawn(move || shared.guard()) {
+            let (shared, span) = (Arc::clone(&self.shared), tracing::Span::current());
+            let guard = move || span.in_scope(|| shared.guard());
+            match thread::Builder::new().name("stage-guard".into()).spawn(guard) {
                 Ok(_) => self.has_thread = true,
                 Err(error) => tracing::error!(%error, "no thread to guard the stage's driver"),
             }
