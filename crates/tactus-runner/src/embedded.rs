@@ -14,7 +14,7 @@ use tactus_schema::{Rig, RigError};
 use crate::config::{ConfigError, RigFiles};
 use crate::order::{self, RunRequest};
 use crate::recorder::{DirectRecorder, ThreadRecorder};
-use crate::twin::{self, DryRun, TwinError};
+use crate::twin::{self, Attend, DryRun, TwinError};
 use crate::{devices, virtual_time};
 
 pub use tactus_virtual::{HIDDEN_SCHEMA, Truth, TruthError, TruthFile};
@@ -99,7 +99,7 @@ pub fn truth(rig: &Rig) -> Option<Truth> {
 /// With `truth`, the devices use that file's sensor instead of the rig file's. It is hidden from the dry run and the
 /// recording: the recording then contains the rig's description, but not its file.
 ///
-/// `stopped` ends the preparation; it is asked every 20 ms until the dry run is over. `started` is called with the engine and
+/// `attendant` is asked every 20 ms until the dry run is over. `started` is called with the engine and
 /// the order just before the run begins; from then on [`Engine::stop`] ends it.
 ///
 /// # Errors
@@ -110,7 +110,7 @@ pub fn run(
     request: RunRequest,
     folder: &Path,
     pace: Pace,
-    stopped: &dyn Fn() -> bool,
+    attendant: &dyn Attend,
     started: impl FnOnce(&Engine, &RunOrder),
 ) -> Result<Finished, EmbeddedError> {
     let Some(service) = rig.service.clone() else {
@@ -129,12 +129,12 @@ pub fn run(
             Pace::Real => Clock::real(),
         }
     });
-    let mut order = order::order(request, rig, clock.now().wall, stopped)?;
+    let mut order = order::order(request, rig, clock.now().wall, &|| attendant.stops())?;
     let hidden = match truth {
         Some(truth) => truth.behind(rig, order.seed)?,
         None => Truth::of_rig(rig, order.seed),
     };
-    let plan = twin::dry_run(rig, order.clone(), stopped)?;
+    let plan = twin::dry_run(rig, order.clone(), attendant)?;
     if !plan.is_possible() {
         return Err(EmbeddedError::NotPossible(Box::new(plan)));
     }

@@ -53,7 +53,7 @@ pub fn rehearse(
         simulation.faults = faults;
     }
     let kept = Kept::default();
-    let outcome = twin::run_on(twin, order, longest, Box::new(kept.clone()), stopped)?;
+    let outcome = twin::run_on(twin, order, longest, Box::new(kept.clone()), &stopped)?;
     let messages = std::mem::take(&mut *kept.messages());
     let of_frame =
         |message: &Message| if let Message::Frame(frame) = message { Some(frame.clone()) } else { None };

@@ -18,8 +18,23 @@ use crate::virtual_time;
 /// No run lasts longer.
 const LONGEST: Duration = Duration::from_hours(72);
 
-/// How often a dry run asks whether it shall stop.
+/// How often who waits for a dry run is asked.
 const POLL: Duration = Duration::from_millis(20);
+
+/// Who waits for a dry run. Asked every 20 ms.
+pub trait Attend {
+    /// True ends the dry run.
+    fn stops(&self) -> bool;
+
+    /// The twin's run, as far as it is.
+    fn sees(&self, _run: &pb::RunState) {}
+}
+
+impl<F: Fn() -> bool> Attend for F {
+    fn stops(&self) -> bool {
+        self()
+    }
+}
 
 /// What an experiment will do, as found by a dry run.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,13 +81,13 @@ impl DryRun {
     }
 }
 
-/// Runs an experiment on the rig's twin. Blocks until it is computed, or until `stopped`, which is asked every 20 ms, is
-/// true: the [`DryRun`] is then stopped, and so not possible.
+/// Runs an experiment on the rig's twin. Blocks until it is computed, or until `attendant` stops it: the [`DryRun`] is then
+/// stopped, and so not possible.
 ///
 /// # Errors
 /// [`TwinError`] if there was no dry run. A refused step is no error: the [`DryRun`] is then not possible.
-pub fn dry_run(rig: &Rig, order: RunOrder, stopped: &dyn Fn() -> bool) -> Result<DryRun, TwinError> {
-    let outcome = run_on(twin_of(rig), order, LONGEST, Box::new(Unrecorded), stopped)?;
+pub fn dry_run(rig: &Rig, order: RunOrder, attendant: &dyn Attend) -> Result<DryRun, TwinError> {
+    let outcome = run_on(twin_of(rig), order, LONGEST, Box::new(Unrecorded), attendant)?;
     Ok(DryRun { outcome })
 }
 
@@ -82,7 +97,7 @@ pub(crate) fn run_on(
     mut order: RunOrder,
     longest: Duration,
     record: Box<dyn Record>,
-    stopped: &dyn Fn() -> bool,
+    attendant: &dyn Attend,
 ) -> Result<RunOutcome, TwinError> {
     order.resets = true;
     if let Some(service) = &mut twin.service {
@@ -98,19 +113,21 @@ pub(crate) fn run_on(
             virtual_time::runtime()?.block_on(run(twin, order, longest, record, &started))
         })
     })?;
-    stop_when_asked(&engines, stopped);
+    attend(&engines, attendant);
     thread.join().map_err(|_| TwinError::Panicked)?
 }
 
-/// Returns when the twin's thread has ended. Once `stopped` is true, it stops the twin's engine, even while a script computes.
-fn stop_when_asked(engines: &Receiver<Engine>, stopped: &dyn Fn() -> bool) {
+/// Returns when the twin's thread has ended. Once the attendant stops it, it stops the twin's engine, even while a script computes.
+fn attend(engines: &Receiver<Engine>, attendant: &dyn Attend) {
     let mut twin: Option<Engine> = None;
     loop {
         match engines.recv_timeout(POLL) {
             Ok(engine) => twin = Some(engine),
             Err(RecvTimeoutError::Disconnected) => return,
             Err(RecvTimeoutError::Timeout) => {
-                if let Some(twin) = twin.as_ref().filter(|_| stopped()) {
+                let Some(twin) = &twin else { continue };
+                attendant.sees(&twin.run_state());
+                if attendant.stops() {
                     let order = StopOrder { by: "request".into(), reason: String::new(), abort: false };
                     twin.stop(order);
                 }

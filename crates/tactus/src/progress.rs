@@ -8,11 +8,12 @@ use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
+use tactus_runner::twin::Attend;
 use tactus_schema::pb::{RunPhase, RunState};
 
 use crate::output::duration;
 
-/// Progress bar of a run on standard error: presses, frames, losses, time left. Hidden with `--json` and without a
+/// Progress bar of a run on standard error, after that of its dry run: presses, frames, losses, time left. Hidden with `--json` and without a
 /// terminal.
 ///
 /// A thread of its own draws, because a terminal may be held (Ctrl-S): whoever shows or says something never waits.
@@ -34,6 +35,8 @@ struct Next {
 struct DrawingOrder {
     /// The latest state only.
     state: Option<RunState>,
+    /// Presses that a dry run has done so far.
+    rehearsed: Option<u32>,
     /// At most [`LINES_MAX`]; more are dropped.
     lines: Vec<String>,
     is_over: bool,
@@ -65,6 +68,11 @@ impl RunProgress {
         self.next.change(|order| order.state = Some(state.clone()));
     }
 
+    /// Shows that the dry run goes on. How much of it is left nobody knows.
+    pub(crate) fn rehearse(&self, presses: u32) {
+        self.next.change(|order| order.rehearsed = Some(presses));
+    }
+
     /// Prints a line above the bar.
     pub(crate) fn say(&self, line: &str) {
         self.next.change(|order| {
@@ -83,6 +91,23 @@ impl RunProgress {
     }
 }
 
+/// An error may end what is in progress.
+impl Drop for RunProgress {
+    fn drop(&mut self) {
+        self.clear();
+    }
+}
+
+impl Attend for RunProgress {
+    fn stops(&self) -> bool {
+        false
+    }
+
+    fn sees(&self, run: &RunState) {
+        self.rehearse(run.presses);
+    }
+}
+
 impl Next {
     fn change(&self, change: impl FnOnce(&mut DrawingOrder)) {
         change(&mut self.order.lock().unwrap_or_else(PoisonError::into_inner));
@@ -92,8 +117,9 @@ impl Next {
     /// Waits for something to draw.
     fn take(&self) -> DrawingOrder {
         let order = self.order.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_empty =
-            |order: &mut DrawingOrder| order.state.is_none() && order.lines.is_empty() && !order.is_over;
+        let is_empty = |order: &mut DrawingOrder| {
+            order.state.is_none() && order.rehearsed.is_none() && order.lines.is_empty() && !order.is_over
+        };
         mem::take(&mut *self.changed.wait_while(order, is_empty).unwrap_or_else(PoisonError::into_inner))
     }
 }
@@ -102,11 +128,15 @@ impl Next {
 fn draw(next: &Next, silent: bool, title: String) {
     let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let bar = ProgressBar::with_draw_target(None, target).with_prefix(title);
-    if let Ok(style) = ProgressStyle::with_template("{prefix}{bar:30.cyan/dim} {pos}/{len} presses  {msg}") {
-        bar.set_style(style);
-    }
+    let styled = |template| {
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+    };
+    styled("{prefix}dry run  {elapsed:>4}  {msg}");
+    let mut is_rehearsing = true;
     loop {
-        let DrawingOrder { state, lines, is_over } = next.take();
+        let DrawingOrder { state, rehearsed, lines, is_over } = next.take();
         for line in lines {
             // A terminal that is gone shows nothing.
             let _gone = bar.suspend(|| writeln!(io::stderr(), "{line}"));
@@ -114,7 +144,16 @@ fn draw(next: &Next, silent: bool, title: String) {
         if is_over {
             return bar.finish_and_clear();
         }
+        if let Some(presses) = rehearsed.filter(|_| is_rehearsing) {
+            // The time goes on without news.
+            bar.enable_steady_tick(ComputationProgress::TICK);
+            bar.set_message(if presses > 0 { format!("{presses} presses so far") } else { String::new() });
+        }
         if let Some(state) = state {
+            if std::mem::take(&mut is_rehearsing) {
+                bar.disable_steady_tick();
+                styled("{prefix}{bar:30.cyan/dim} {pos}/{len} presses  {msg}");
+            }
             show(&bar, &state);
         }
     }

@@ -512,7 +512,7 @@ fn prepare(
     };
     info!(who = request.who, "the dry run begins");
     let order = order::order(request, rig, now, stopped).map_err(Refusal::usage)?;
-    let plan = twin::dry_run(rig, order.clone(), stopped).map_err(Refusal::failed)?;
+    let plan = twin::dry_run(rig, order.clone(), &stopped).map_err(Refusal::failed)?;
     if let Some(note) = &note {
         info!("{note}");
     }

@@ -18,6 +18,7 @@ use crate::cli::{Common, PlanArgs};
 use crate::connection::{self, PATIENCE};
 use crate::exit::{Exit, Failure, at_source};
 use crate::output::{duration, print_fields, print_table, say, say_next};
+use crate::progress::RunProgress;
 use crate::source_line::with_source_line;
 
 /// Default seed, so that repeated plans agree.
@@ -47,7 +48,10 @@ fn plan_of(common: &Common, args: &PlanArgs, script: Script, arguments: Argument
     let order = order::order(request, &rig, WallTime::default(), &never)
         .map_err(|error| Failure::new(Exit::Usage, error))?;
     let values: serde_json::Value = serde_json::from_str(&order.arguments.to_json())?;
-    let plan = twin::dry_run(&rig, order, &never)?;
+    let progress = RunProgress::new(common.json, "");
+    let plan = twin::dry_run(&rig, order, &progress);
+    progress.clear();
+    let plan = plan?;
     if common.json {
         let mut told = to_json(&name, &rig, &parameters, &values, &plan);
         told["rig_of"] = whose.into();

@@ -171,11 +171,7 @@ fn check_script(file: &Path) -> anyhow::Result<String> {
     let script = experiments::find(&file.to_string_lossy(), None)?;
     let rig = Rig::from_toml(SIMULATED_RIG)?;
     let parameters = script.parameters(&RigView::of(&rig))?;
-    Ok(format!(
-        "experiment {:?} with {} parameters; `tactus plan` dry-runs it",
-        script.name(),
-        parameters.len()
-    ))
+    Ok(format!("experiment {:?} with {} parameters", script.name(), parameters.len()))
 }
 
 fn check_recording(file: &Path) -> anyhow::Result<String> {

@@ -14,6 +14,7 @@ use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, TruthError, T
 use tactus_runner::experiments;
 use tactus_runner::order::RunRequest;
 use tactus_runner::script_process::ScriptProcesses;
+use tactus_runner::twin::Attend;
 use tactus_schema::Rig;
 use tactus_schema::pb::{self, RunPhase, RunState};
 use tokio::sync::watch;
@@ -53,7 +54,8 @@ pub(super) fn run(args: &RunArgs, subject: Subject, why: &str, told: Told<'_>) -
     let stopped = StopsRun::is_asked;
     let request = request(args, subject, rig, &stopped)?;
     let taken_over = request.earlier.as_ref().map(|earlier| earlier.taken_over());
-    let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, &stopped, |engine, order| {
+    let waiting = Waiting(&progress);
+    let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, &waiting, |engine, order| {
         StopsRun::begin(engine.clone());
         if let Some(taken) = taken_over.as_ref().filter(|_| told.has_words()) {
             progress.say(&taken_over_in_words(taken, order.planned.map_or(0, |planned| planned.presses)));
@@ -98,6 +100,19 @@ pub(super) fn run(args: &RunArgs, subject: Subject, why: &str, told: Told<'_>) -
         recording: std::path::absolute(recording)?,
         taken_over,
     })
+}
+
+/// A person who waits for the dry run, and may end it by Ctrl-C.
+struct Waiting<'a>(&'a RunProgress);
+
+impl Attend for Waiting<'_> {
+    fn stops(&self) -> bool {
+        StopsRun::is_asked()
+    }
+
+    fn sees(&self, run: &RunState) {
+        self.0.sees(run);
+    }
 }
 
 /// The request for what is to be run. An earlier run is looked for where the new one will be.

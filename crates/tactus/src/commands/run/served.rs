@@ -28,8 +28,12 @@ pub(super) async fn run(
     }
     let mut states = client.subscribe::<RunState>(History::Last).await?;
     let held = connection::hold(&client, &args.lease).await?;
+    let rehearsing = told.progress();
+    rehearsing.rehearse(0);
     let request = pb::RunRequest { who: args.who.clone(), lease: held.secret(), ..request_of(subject) };
-    let reply = match connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await {
+    let reply = connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await;
+    rehearsing.clear();
+    let reply = match reply {
         Ok(reply) => reply,
         Err(refusal) => {
             connection::release(held).await;
