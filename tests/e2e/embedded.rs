@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use tactus_e2e::{repository, tactus};
+use tactus_e2e::{Terminal, repository, tactus};
 use tactus_record::{Entry, Message, rows};
 use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_schema::WallTime;
@@ -247,4 +247,20 @@ fn every_shipped_file_is_valid() {
     args.extend(files.iter().map(String::as_str));
     let said = tactus(folder.path(), &args);
     assert_eq!(said.code, Some(0), "{said:?}");
+}
+
+#[test]
+fn a_person_sees_how_far_a_dry_run_a_run_and_a_study_are() {
+    let folder = TempDir::new().unwrap();
+    let start = |args: &[&str]| Terminal::start("tactus", folder.path(), args, [120, 30]);
+    let mut planned = start(&["plan", "grid-sweep", "--embedded"]);
+    planned.wait_for(&["dry run ", " presses so far"]);
+    drop(planned);
+    let mut run = start(&["run", "element-centres", "--embedded"]);
+    run.wait_for(&["dry run "]);
+    run.wait_until(|screen| screen.contains("/48 presses") && screen.contains(" left"));
+    drop(run);
+    let mut study = start(&["study", "--embedded", "--points", "5", "--out", "study"]);
+    study.wait_for(&["1 of 6, corners"]);
+    study.wait_for(&["2 of 6, element-centres", "/48 presses"]);
 }

@@ -220,3 +220,27 @@ impl ComputationProgress {
         self.bar.finish_and_clear();
     }
 }
+
+/// Work of which nobody knows how long it takes: what it is, and the time so far. Hidden where [`RunProgress`] is; ends with this.
+#[derive(Debug)]
+pub(crate) struct Busy(ProgressBar);
+
+impl Busy {
+    pub(crate) fn with(what: &'static str, silent: bool) -> Self {
+        let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(None, target)
+            .with_finish(ProgressFinish::AndClear)
+            .with_message(what);
+        if let Ok(style) = ProgressStyle::with_template("{msg}  {elapsed:>4}") {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(ComputationProgress::TICK);
+        Self(bar)
+    }
+}
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -16,6 +16,7 @@ use tactus_schema::{Model, Rig};
 use crate::cli::{CalibrateArgs, Common};
 use crate::exit::Exit;
 use crate::output;
+use crate::progress::Busy;
 
 pub(crate) use print::{estimate, faulty};
 
@@ -48,8 +49,10 @@ struct CalibrationJson<'a> {
 }
 
 pub(crate) fn calibrate(common: &Common, args: &CalibrateArgs) -> anyhow::Result<Exit> {
+    let busy = Busy::with("reading and fitting", common.json);
     let calibrated = from_files(&args.files)?;
     let paths = write(&calibrated, &args.out)?;
+    drop(busy);
     if common.json {
         output::write(&format!("{}\n", calibrated.to_json()?))?;
     } else {

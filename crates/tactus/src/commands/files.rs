@@ -11,6 +11,7 @@ use crate::cli::{Common, ExportArgs, RecoverArgs, ReportArgs};
 use crate::commands::run::write_report;
 use crate::exit::{Exit, Failure, in_words};
 use crate::output::{duration, print_fields, print_table, say_next};
+use crate::progress::Busy;
 
 /// The exit status of a run whose service died, as recordings tell it.
 const CRASHED: &str = pb::ExitStatus::Crashed.word();
@@ -92,7 +93,9 @@ pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit>
         return export_for_viewers(common, args);
     }
     let (out, format) = table_of(args)?;
+    let busy = Busy::with("exporting", common.json);
     let summary = tactus_record::export_as(&args.recordings, &out, format)?;
+    drop(busy);
     if common.json {
         println!("{}", serde_json::to_string(&summary)?);
     } else {
@@ -125,7 +128,9 @@ fn export_for_viewers(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit
         let what = format!("--out {} is the recording itself: name another file", out.display());
         return Err(Failure::new(Exit::Usage, what).into());
     }
+    let busy = Busy::with("exporting", common.json);
     let written = tactus_report::viewer_file(recording, out)?;
+    drop(busy);
     if common.json {
         println!("{}", serde_json::to_string(&written)?);
     } else {
@@ -163,7 +168,9 @@ fn table_of(args: &ExportArgs) -> anyhow::Result<(PathBuf, TableFormat)> {
 
 pub(crate) fn recover(common: &Common, args: &RecoverArgs) -> anyhow::Result<Exit> {
     let out = args.out.clone().unwrap_or_else(|| beside(Some(&args.recording), "recovered.mcap"));
+    let busy = Busy::with("reading what is intact", common.json);
     let recovery = tactus_record::recover(&args.recording, &out)?;
+    drop(busy);
     if common.json {
         println!(
             "{}",
@@ -197,11 +204,14 @@ pub(crate) fn recover(common: &Common, args: &RecoverArgs) -> anyhow::Result<Exi
 
 pub(crate) fn report(common: &Common, args: &ReportArgs) -> anyhow::Result<Exit> {
     let out = args.out.clone().unwrap_or_else(|| beside(Some(&args.recording), "report.html"));
+    let busy = Busy::with("writing the report", common.json);
     let path = write_report(&args.recording, &out)?;
+    drop(busy);
     if common.json {
         println!("{}", json!({ "report": path }));
     } else {
         print_fields(&[("report", path.display().to_string())]);
+        say_next(&format!("{} shows it in a browser", path.display()));
     }
     Ok(Exit::Done)
 }

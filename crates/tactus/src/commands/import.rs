@@ -10,12 +10,15 @@ use tactus_import::Summary;
 use crate::cli::{Common, ImportArgs};
 use crate::exit::{Exit, Failure};
 use crate::output::{print_fields, say, say_next};
+use crate::progress::Busy;
 
 pub(crate) fn import(common: &Common, args: &ImportArgs) -> anyhow::Result<Exit> {
     match (&args.map, &args.new_map) {
         (Some(map), None) => {
             let out = args.out.clone().unwrap_or_else(|| args.files[0].with_extension("parquet"));
+            let busy = Busy::with("reading", common.json);
             let summary = tactus_import::import(map, &args.files, out)?;
+            drop(busy);
             Ok(told(common, &summary))
         }
         (None, Some(map)) => propose(common, &args.files[0], map),
