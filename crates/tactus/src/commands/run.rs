@@ -15,7 +15,7 @@ use crate::cli::{Common, RunArgs};
 use crate::connection;
 use crate::exit::{Exit, Failure, at_source, in_words};
 use crate::output::{duration, print_fields, say};
-use crate::progress::RunProgress;
+use crate::progress::{Busy, RunProgress};
 
 /// How a run ended.
 pub(super) struct RunSummary {
@@ -54,7 +54,9 @@ pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
 /// Runs, writes the report, and says how it ended.
 pub(super) fn run_subject(common: &Common, args: &RunArgs, subject: Subject) -> anyhow::Result<Exit> {
     let summary = execute_at_source(common, args, subject, None)?;
+    let busy = (!args.no_report).then(|| Busy::with("writing the report", common.json));
     let report = if args.no_report { None } else { make_report(&summary, &args.out) };
+    drop(busy);
     if common.json {
         say(&to_json(&summary, report.as_deref()).to_string());
     } else {
