@@ -139,7 +139,7 @@ fn a_service_refuses_bombs_and_stays_as_it_was() {
         assert!(said.out.contains("the script's"), "{what}: {said:?}");
         assert!(resident_kib(&lab) < before_kib + (64 << 10), "{what}");
     }
-    let runs = std::fs::read_dir(lab.folder.path().join("runs")).unwrap();
+    let runs = fs::read_dir(lab.folder.path().join("runs")).unwrap();
     assert_eq!(runs.count(), 0, "nothing was run");
     let script = lab.script("good.star", "def run(rig):\n    tare()\n");
     assert_eq!(lab.tactus(&["--json", "run", &script, "--no-report"]).code, Some(0));

@@ -161,7 +161,7 @@ fn the_temperature_that_a_sensor_tells_is_in_the_table() {
     let dir = tempfile::tempdir().unwrap();
     let run = Plan::short(1).make();
     let path = dir.path().join("run.mcap");
-    let told = |seq: u64| (seq % 3 != 0).then_some(20.0 + seq as f32 / 64.0);
+    let told = |seq: u64| (!seq.is_multiple_of(3)).then_some(20.0 + seq as f32 / 64.0);
     recorded_as(&run, &path, |fed| {
         if let Fed::Frame(frame) = fed {
             frame.temperature_c = told(frame.seq);

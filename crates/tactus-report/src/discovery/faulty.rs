@@ -45,7 +45,8 @@ pub(super) fn in_words(found: &Discovery) -> Option<String> {
         }
         FaultKind::Dead | FaultKind::Stuck { .. } | FaultKind::Noisy { .. } => None,
     });
-    let is_told = |element: f64| found.faulty.iter().any(|one| one.element as f64 == element);
+    let is_told =
+        |element: f64| found.faulty.iter().any(|one| (one.element as f64).total_cmp(&element).is_eq());
     let fitted = found.steps.iter().filter(|step| step.effect == "miswired").flat_map(|step| &step.terms);
     let fitted = fitted.filter_map(|term| {
         let of = |name: &str| term.iter().find(|one| one.name == name).map(|one| one.value);
