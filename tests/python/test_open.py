@@ -94,7 +94,8 @@ def test_the_temperature_is_the_one_of_the_sensor(tmp_path):
     (tmp_path / "rest.star").write_text("def run(rig):\n    wait(1.0)\n")
     made = tactus("run", "rest.star", "--rig-file", "board.toml", "--no-report", cwd=tmp_path)
     recording = tmp_path / made["recording"]
-    tactus("export", recording, "--out", tmp_path / "table.parquet")
+    # A board has no clock, of which the export warns with its exit code.
+    tactus("export", recording, "--out", tmp_path / "table.parquet", check=False)
     told = pq.read_table(tmp_path / "table.parquet")["temperature_c"].to_numpy()
     assert (told == 25.0).all() and len(told) > 20
     assert (tactus_client.open(recording).frames["temperature_c"].to_numpy() == told).all()
