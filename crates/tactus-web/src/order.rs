@@ -48,6 +48,7 @@ struct RunForm {
 /// Body of `POST /move`: a place in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "all are lengths in mm")]
 struct MoveForm {
     x_mm: f64,
     y_mm: f64,

@@ -150,7 +150,7 @@ fn draw(next: &Next, silent: bool, title: String) {
             bar.set_message(if presses > 0 { format!("{presses} presses so far") } else { String::new() });
         }
         if let Some(state) = state {
-            if std::mem::take(&mut is_rehearsing) {
+            if mem::take(&mut is_rehearsing) {
                 bar.disable_steady_tick();
                 styled("{prefix}{bar:30.cyan/dim} {pos}/{len} presses  {msg}");
             }
