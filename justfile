@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls features vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
+nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls hosts features vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -423,6 +423,15 @@ kill-trials trials="200": build
 # The service in real time with runs and a subscriber: memory, frames, clock.
 soak hours="1": build
     TACTUS_SOAK_HOURS={{ hours }} cargo test --workspace --test e2e soak:: -- --nocapture
+
+# Hosts as network namespaces, joined by a stock zenohd, with a cable that is down for half a minute; some four minutes. As root; the first
+# time it builds zenohd.
+hosts: build
+    test -x {{ tools }}/bin/zenohd || \
+        CARGO_PROFILE_RELEASE_OPT_LEVEL=1 CARGO_PROFILE_RELEASE_LTO=off CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 \
+        cargo install --locked zenohd --version 1.10.2 --no-default-features --features zenoh/transport_tcp \
+        --root {{ tools }} --target-dir {{ tools }}/build
+    TACTUS_ZENOHD={{ tools }}/bin/zenohd cargo test --workspace --test e2e hosts:: -- --nocapture
 
 # Plants defects, one at a time: the tests must find each.
 mutants word="":

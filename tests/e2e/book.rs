@@ -52,6 +52,7 @@ pages! {
     experiment: "docs/book/how-to/experiment.md",
     effect: "docs/book/how-to/effect.md",
     recordings: "docs/book/how-to/recordings.md",
+    hosts: "docs/book/how-to/hosts.md",
     calibrate: "docs/book/how-to/calibrate.md",
     discover: "docs/book/how-to/discover.md",
     simulate: "docs/book/how-to/simulate.md",

@@ -12,6 +12,7 @@ mod discover;
 mod disk;
 mod effects;
 mod embedded;
+mod hosts;
 mod import;
 mod kill_trials;
 mod link;

@@ -4,6 +4,7 @@
 //! answer or an exit, with a deadline that only a hang can reach.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot go on says why and fails")]
 
+mod link;
 mod tap;
 mod terminal;
 
@@ -24,6 +25,7 @@ use rustix::pty::{OpenptFlags, openpt, ptsname, unlockpt};
 use serde_json::Value;
 use tempfile::TempDir;
 
+pub use link::Link;
 pub use tap::{Tap, Way};
 pub use terminal::Terminal;
 
@@ -112,6 +114,17 @@ impl Process {
         Self::start_with(name, folder, args, &[], Stdio::piped(), None)
     }
 
+    /// As [`Self::start`], but any program, in a network namespace.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn start_in(namespace: &str, program: &Path, folder: &Path, args: &[&str]) -> Self {
+        let mut inside = Command::new("ip");
+        inside.args(["netns", "exec", namespace, "env", "--default-signal=HUP,INT,QUIT,TERM"]);
+        inside.arg(program);
+        Self::spawn(&program.display().to_string(), inside, folder, args, Stdio::piped(), None)
+    }
+
     /// As [`Self::start`], with the variables that the service's unit sets.
     ///
     /// # Panics
@@ -164,10 +177,20 @@ impl Process {
         unread: Option<OwnedFd>,
     ) -> Self {
         // Whoever runs the tests may ignore signals, as `nohup` does.
-        let mut child = Command::new("env")
-            .args(["--default-signal=HUP,INT,QUIT,TERM"])
-            .args(variables)
-            .arg(binary(name))
+        let mut command = Command::new("env");
+        command.args(["--default-signal=HUP,INT,QUIT,TERM"]).args(variables).arg(binary(name));
+        Self::spawn(name, command, folder, args, stderr, unread)
+    }
+
+    fn spawn(
+        name: &str,
+        mut command: Command,
+        folder: &Path,
+        args: &[&str],
+        stderr: Stdio,
+        unread: Option<OwnedFd>,
+    ) -> Self {
+        let mut child = command
             .args(args)
             .current_dir(folder)
             .env("RUST_LOG", "info,zenoh=error")

@@ -1,11 +1,6 @@
 //! The bus on a client's side.
 
-use std::{
-    collections::{BTreeMap, VecDeque},
-    error::Error,
-    io,
-    time::Duration,
-};
+use std::{collections::BTreeMap, error::Error, io, sync::Arc, time::Duration};
 
 use tactus_schema::{
     Message,
@@ -14,6 +9,8 @@ use tactus_schema::{
 };
 use tokio::{
     net::{TcpStream, UnixStream},
+    sync::{Semaphore, watch},
+    task::JoinSet,
     time::{Instant, timeout, timeout_at},
 };
 use zenoh::{
@@ -26,9 +23,9 @@ use zenoh::{
 };
 
 use crate::{
-    Alive, BusError, Credentials, Endpoint, HeldLease, History, Hold, Published, Subscription, config,
+    Alive, BusError, Credentials, Endpoint, Gap, HeldLease, History, Hold, Published, Subscription, config,
     error::of_zenoh,
-    liveness::{Roster, Trust},
+    liveness::{Known, Roster, Trust},
     topic::encoding,
 };
 
@@ -44,7 +41,16 @@ const OTHERS_PATIENCE: Duration = Duration::from_secs(1);
 pub struct Client {
     caller: Caller,
     endpoint: Endpoint,
-    roster: Roster,
+    roster: Arc<Roster>,
+}
+
+/// All rigs that an endpoint reaches, over one connection: those of one service or, behind a router, of all hosts.
+#[derive(Debug)]
+pub struct Lab {
+    session: Session,
+    endpoint: Endpoint,
+    roster: Arc<Roster>,
+    changes: watch::Receiver<Known>,
 }
 
 /// What it takes to send commands.
@@ -85,19 +91,12 @@ impl Client {
         if let Some(rig) = rig {
             check_rig_name(rig)?;
         }
-        reach(endpoint).await?;
-        let session = open(endpoint, credentials).await?;
-        let roster = Roster::keep(&session).await?;
-        let neighbours: Vec<ZenohId> = session.info().peers_zid().await.collect();
+        let lab = Lab::connect(endpoint, credentials).await?;
         let rig = match rig {
-            Some(rig) => the_named_rig(rig, &roster, endpoint)?,
-            None => the_rig_of(&neighbours, &roster, endpoint)?,
+            Some(rig) => the_named_rig(rig, &lab.roster, endpoint)?,
+            None => the_rig_of(&lab.neighbours().await, &lab.roster, endpoint)?,
         };
-        if roster.is_ambiguous(&rig, &neighbours) {
-            return Err(BusError::SeveralServices { endpoint: endpoint.to_string(), rig });
-        }
-        let caller = Caller { session, trust: roster.trust(&rig), keys: Keys::new(rig) };
-        Ok(Self { caller, endpoint: endpoint.clone(), roster })
+        lab.client(&rig).await
     }
 
     /// Name of the rig that this client commands.
@@ -180,7 +179,20 @@ impl Client {
         Subscription::declare(session, keys, history, trust.clone()).await
     }
 
-    /// Closes the connection; subscriptions end.
+    /// Asks once more for messages that a subscription misses: [`Subscription::gap`]. Gives those that their publisher still keeps, in
+    /// order; `None` if it does not answer, such as while the connection is cut.
+    ///
+    /// # Errors
+    /// [`BusError::Key`] if the session is closed.
+    pub async fn ask_again<M: Published>(
+        &self,
+        gap: &Gap,
+        patience: Duration,
+    ) -> Result<Option<Vec<M>>, BusError> {
+        gap.ask(&self.caller.session, &self.caller.keys, patience).await
+    }
+
+    /// Closes the connection, also for the other clients of a [`Lab`]; subscriptions end.
     ///
     /// # Errors
     /// [`BusError::Close`] if zenoh could not close the session cleanly.
@@ -211,6 +223,61 @@ impl Caller {
     }
 }
 
+impl Lab {
+    /// Connects to the service or the router at an endpoint; fails at once if nothing listens there.
+    ///
+    /// # Errors
+    /// [`BusError::NoService`], [`BusError::NotAllowed`], [`BusError::Session`].
+    ///
+    /// # Panics
+    /// As [`Client::connect`].
+    pub async fn connect(endpoint: &Endpoint, credentials: &Credentials) -> Result<Self, BusError> {
+        reach(endpoint).await?;
+        let session = open(endpoint, credentials).await?;
+        let roster = Arc::new(Roster::keep(&session).await?);
+        let changes = roster.changes();
+        Ok(Self { session, endpoint: endpoint.clone(), roster, changes })
+    }
+
+    /// Names of the rigs whose services run now, ready or not, sorted.
+    pub fn rigs(&self) -> Vec<String> {
+        self.roster.served()
+    }
+
+    /// Waits until a service comes, becomes ready or goes; `None` once the connection is closed. Cancel-safe.
+    pub async fn changed(&mut self) -> Option<()> {
+        self.changes.changed().await.ok()
+    }
+
+    /// A client of one of the rigs, which shares the connection.
+    ///
+    /// # Errors
+    /// [`BusError::RigName`] for an invalid name; [`BusError::SeveralServices`] if more than one says that it is the rig's.
+    pub async fn client(&self, rig: &str) -> Result<Client, BusError> {
+        check_rig_name(rig)?;
+        if self.roster.is_ambiguous(rig, &self.neighbours().await) {
+            let (endpoint, rig) = (self.endpoint.to_string(), rig.to_owned());
+            return Err(BusError::SeveralServices { endpoint, rig });
+        }
+        let (session, trust) = (self.session.clone(), self.roster.trust(rig));
+        let caller = Caller { session, trust, keys: Keys::new(rig) };
+        Ok(Client { caller, endpoint: self.endpoint.clone(), roster: Arc::clone(&self.roster) })
+    }
+
+    /// Closes the connection; subscriptions end.
+    ///
+    /// # Errors
+    /// [`BusError::Close`] if zenoh could not close the session cleanly.
+    pub async fn close(self) -> Result<(), BusError> {
+        self.session.close().await.map_err(|source| BusError::Close { source: of_zenoh(&source) })
+    }
+
+    /// The services at the other end of the connection.
+    async fn neighbours(&self) -> Vec<ZenohId> {
+        self.session.info().peers_zid().await.collect()
+    }
+}
+
 /// Names of all rigs whose services run at an endpoint, ready or not, sorted.
 ///
 /// # Errors
@@ -219,15 +286,14 @@ impl Caller {
 /// # Panics
 /// As [`Client::connect`].
 pub async fn rigs_at(endpoint: &Endpoint, credentials: &Credentials) -> Result<Vec<String>, BusError> {
-    reach(endpoint).await?;
-    let session = open(endpoint, credentials).await?;
-    let rigs = Roster::keep(&session).await?.served();
-    session.close().await.map_err(|source| BusError::Close { source: of_zenoh(&source) })?;
+    let lab = Lab::connect(endpoint, credentials).await?;
+    let rigs = lab.rigs();
+    lab.close().await?;
     Ok(rigs)
 }
 
 /// Sends one command to every rig of the service at an endpoint or, if that is a router, to every rig behind it. Each answer comes
-/// with its rig's name, sorted by it; `None` if the rig did not answer in time.
+/// with its rig's name, sorted by it, or why there is none: as [`Lab::client`] and [`Client::command`].
 ///
 /// # Errors
 /// [`BusError::NoService`], [`BusError::NotAllowed`], [`BusError::Session`]; [`BusError::NoRig`] if there is none.
@@ -240,35 +306,30 @@ pub async fn ask_all<M: Message + Clone + 'static>(
     command: Command,
     request: &M,
     patience: Duration,
-) -> Result<Vec<(String, Option<pb::CommandReply>)>, BusError> {
-    reach(endpoint).await?;
-    let session = open(endpoint, credentials).await?;
-    let roster = Roster::keep(&session).await?;
-    let neighbours: Vec<ZenohId> = session.info().peers_zid().await.collect();
-    let own = roster.rigs_of(&neighbours);
-    let rigs = if own.is_empty() { roster.served() } else { own };
+) -> Result<Vec<(String, Result<pb::CommandReply, BusError>)>, BusError> {
+    let lab = Lab::connect(endpoint, credentials).await?;
+    let own = lab.roster.rigs_of(&lab.neighbours().await);
+    let rigs = if own.is_empty() { lab.rigs() } else { own };
     if rigs.is_empty() {
         return Err(BusError::NoRig { endpoint: endpoint.to_string() });
     }
-    let mut asking = VecDeque::new();
-    let mut answers = Vec::new();
+    // A service takes so many at once and refuses more.
+    let (places, mut asking) = (Arc::new(Semaphore::new(ASKED_AT_ONCE)), JoinSet::new());
     for rig in rigs {
-        let caller =
-            Caller { session: session.clone(), trust: roster.trust(&rig), keys: Keys::new(rig.clone()) };
-        let request = request.clone();
-        let asked = tokio::spawn(async move { caller.command(command, &request, patience).await.ok() });
-        asking.push_back((rig, asked));
-        // A service takes so many at once and refuses more.
-        if asking.len() == ASKED_AT_ONCE
-            && let Some((rig, asked)) = asking.pop_front()
-        {
-            answers.push((rig, asked.await.ok().flatten()));
-        }
+        let (client, request, places) = (lab.client(&rig).await, request.clone(), Arc::clone(&places));
+        asking.spawn(async move {
+            // Nobody closes it.
+            let _place = places.acquire().await;
+            let answer = match client {
+                Ok(client) => client.command(command, &request, patience).await,
+                Err(error) => Err(error),
+            };
+            (rig, answer)
+        });
     }
-    for (rig, asked) in asking {
-        answers.push((rig, asked.await.ok().flatten()));
-    }
-    session.close().await.map_err(|source| BusError::Close { source: of_zenoh(&source) })?;
+    let mut answers = asking.join_all().await;
+    answers.sort_by(|(rig, _), (other, _)| rig.cmp(other));
+    lab.close().await?;
     Ok(answers)
 }
 

@@ -10,8 +10,11 @@ pub enum BusError {
     #[error("endpoint {endpoint:?}: {reason}; it should read tcp/HOST:PORT, such as tcp/127.0.0.1:7447")]
     Endpoint { endpoint: String, reason: &'static str },
     /// An endpoint that other machines reach without a certificate.
-    #[error("the bus does not listen on {endpoint}: {reason}")]
+    #[error("the bus does not use {endpoint}: {reason}")]
     Unprotected { endpoint: String, reason: &'static str },
+    /// A number of frames to keep that cannot be.
+    #[error("frames_kept = {frames}: 1 to {frames_max} frames of each rig can be kept")]
+    FramesKept { frames: usize, frames_max: usize },
     /// What should be denied was not: see [`crate::BusConfig`].
     #[error(
         "the bus does not listen on {endpoint}: a client {who} could command the rig; see docs/security.md"
@@ -36,7 +39,7 @@ pub enum BusError {
     Session { endpoint: String, source: Box<dyn Error + Send + Sync> },
     /// Two programs say that they are one rig's service.
     #[error(
-        "several programs at {endpoint} say that they are the service of rig {rig:?}; connect to the service itself"
+        "several programs at {endpoint} say that they are the service of rig {rig:?}: give each rig a name of its own; until then, connect to its service itself"
     )]
     SeveralServices { endpoint: String, rig: String },
     /// A rig's name with characters that a key cannot have.

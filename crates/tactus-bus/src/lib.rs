@@ -1,14 +1,16 @@
 //! The bus between the service and its clients, based on zenoh: published messages, commands and liveliness.
 //!
 //! The service opens a [`Node`], puts each of its rigs on it as a [`Bus`], and hands out [`Publisher`]s, whose calls never
-//! wait; it receives commands as [`CommandCall`]s. A client uses [`Client::connect`], [`Client::command`] and [`Client::subscribe`]. Keys, messages and encoding are those
+//! wait; it receives commands as [`CommandCall`]s. A client uses [`Client::connect`], [`Client::command`] and [`Client::subscribe`]; a [`Lab`] has clients of many rigs over one
+//! connection. Keys, messages and encoding are those
 //! of `tactus-schema`, so any zenoh client in any language can take part.
 //!
 //! | topic | kept for late joiners |
 //! |---|---|
-//! | `sensor/frame` | the last 300 (10 s); with more than 256 rigs fewer, 76,800 of all |
+//! | `sensor/frame`, `stage/state` | the last 1,800, a minute of frames; with more than 42 rigs fewer, 76,800 of all; or [`BusConfig::frames_kept`] |
 //! | `run/event` | the last 16,384 |
-//! | all others | the last one |
+//! | `sensor/info`, `safety/state` | the last 256 |
+//! | `run/state`, `health` | the last one |
 //!
 //! Of each topic at most 4 MiB are kept.
 //!
@@ -48,7 +50,7 @@ mod subscription;
 mod topic;
 mod worker;
 
-pub use client::{Client, ask_all, rigs_at, stop};
+pub use client::{Client, Lab, ask_all, rigs_at, stop};
 pub use command::{Calls, CommandCall, Request, Responder};
 pub use config::{BusConfig, Credentials, TlsConfig};
 pub use endpoint::Endpoint;
@@ -58,5 +60,5 @@ pub use liveness::{Alive, AliveToken};
 pub use node::Node;
 pub use publisher::Publisher;
 pub use service::Bus;
-pub use subscription::{History, Losses, Subscription};
+pub use subscription::{Gap, History, Losses, Subscription};
 pub use topic::Published;

@@ -240,6 +240,13 @@ impl Roster {
         Ok(Self { known, _subscriber: subscriber })
     }
 
+    /// Shows each change of the roster, from now on.
+    pub(crate) fn changes(&self) -> watch::Receiver<Known> {
+        let mut changes = self.known.clone();
+        changes.mark_unchanged();
+        changes
+    }
+
     /// Names of the rigs that are ready now, sorted.
     pub(crate) fn rigs(&self) -> Vec<String> {
         self.known.borrow().ready.iter().cloned().collect()

@@ -96,7 +96,7 @@ impl Node {
             history_queries,
             stops,
             served,
-            frames_kept: frames_kept(rigs.len()),
+            frames_kept: frames_kept(config.frames_kept, rigs.len()),
             command_replies,
             history_replies,
             _stop: stop,

@@ -87,7 +87,7 @@ struct TopicPublisher {
 }
 
 impl TopicPublishers {
-    /// Declares the publishers of the lane's topics; `frames_kept` is the longest history.
+    /// Declares the publishers of the lane's topics; `frames_kept` frames are kept.
     pub(crate) async fn declare(
         session: &Session,
         keys: &Keys,
@@ -137,8 +137,8 @@ impl TopicPublisher {
             .await
             .map_err(BusError::key(&key))?;
         let source = Source { key, publisher: publisher.id(), encoding };
-        let history = if topic == Topic::SensorFrame { frames_kept } else { policy.history };
-        let cache = Cache::declare(session, source, history, history_queries.clone()).await?;
+        let kept = policy.kept.messages(frames_kept);
+        let cache = Cache::declare(session, source, kept, history_queries.clone()).await?;
         Ok(Self { publisher, cache })
     }
 

@@ -1,8 +1,10 @@
 //! A client's subscription to one topic.
 
 use std::{
+    collections::HashMap,
     marker::PhantomData,
     mem,
+    ops::RangeInclusive,
     sync::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicU64, Ordering},
@@ -24,7 +26,7 @@ use crate::{
     liveness::Trust,
     merge::{Merge, Numbered},
     queue::Queue,
-    topic::{Policy, encoding, heard},
+    topic::{FRAMES_KEPT_MAX, Policy, encoding, heard},
 };
 
 /// Time limit for the history; later replies are ignored.
@@ -58,11 +60,23 @@ pub struct Losses {
     pub foreign: u64,
 }
 
+/// Messages of one topic that their publisher sent in a row and that did not arrive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Gap {
+    publisher: EntityGlobalId,
+    /// The publisher's numbers.
+    numbers: RangeInclusive<u32>,
+}
+
 /// Messages of one topic, in order.
 #[derive(Debug)]
 pub struct Subscription<M> {
     reception: Arc<Reception>,
     trust: Trust,
+    /// The last message of each publisher that was given out.
+    last: HashMap<EntityGlobalId, u32>,
+    /// What is missing just before it.
+    gap: Option<Gap>,
     /// Taken, while nobody speaks for the rig yet.
     undecided: Option<Sample>,
     unreadable: u64,
@@ -79,6 +93,34 @@ struct Reception {
     foreign: AtomicU64,
 }
 
+impl Gap {
+    /// How many messages it is.
+    pub fn messages(&self) -> u64 {
+        u64::from(self.numbers.end() - self.numbers.start()) + 1
+    }
+
+    /// Asks the publisher for them. If it has none of them, it is asked for its last message, which shows whether it answers: `None` if
+    /// it does not.
+    pub(crate) async fn ask<M: Published>(
+        &self,
+        session: &Session,
+        keys: &Keys,
+        patience: Duration,
+    ) -> Result<Option<Vec<M>>, BusError> {
+        let publisher = self.publisher;
+        let key = format!("{}/@adv/pub/{}/{}/**", keys.topic(M::TOPIC), publisher.zid(), publisher.eid());
+        let (first, last) = self.numbers.clone().into_inner();
+        let mut found = ask(session, &format!("{key}?_sn={first}..{last}"), patience).await?;
+        // Nobody else may answer in its place.
+        found.retain(|Numbered { origin, .. }| origin.is_some_and(|(by, _)| by == publisher));
+        if found.is_empty() && ask(session, &format!("{key}?_max=1"), patience).await?.is_empty() {
+            return Ok(None);
+        }
+        let read = |found: Numbered<_, Sample>| M::decode(&*found.item.payload().to_bytes()).ok();
+        Ok(Some(found.into_iter().filter_map(read).collect()))
+    }
+}
+
 impl<M: Published> Subscription<M> {
     /// Returns once the history has arrived.
     pub(crate) async fn declare(
@@ -90,9 +132,9 @@ impl<M: Published> Subscription<M> {
         let key = keys.topic(M::TOPIC);
         let reception = Arc::new(Reception {
             merge: Mutex::new(Merge::awaiting_history()),
-            // Drop-oldest, counted; holds the whole history and as much again.
+            // Drop-oldest, counted; holds the longest history and as much again.
             arrived: Queue::bounded(
-                1_024.max(2 * Policy::of(M::TOPIC).history),
+                1_024.max(2 * Policy::of(M::TOPIC).kept.messages(FRAMES_KEPT_MAX)),
                 ARRIVED_BYTES_MAX,
                 |sample: &Sample| sample.payload().len(),
             ),
@@ -110,6 +152,8 @@ impl<M: Published> Subscription<M> {
         Ok(Self {
             reception,
             trust,
+            last: HashMap::new(),
+            gap: None,
             undecided: None,
             unreadable: 0,
             _subscriber: subscriber,
@@ -123,6 +167,7 @@ impl<M: Published> Subscription<M> {
         let expected = encoding(M::NAME);
         loop {
             let sample = self.next_of_service().await?;
+            self.count(&sample);
             if *sample.encoding() == expected
                 && let Ok(message) = M::decode(&*sample.payload().to_bytes())
             {
@@ -155,6 +200,33 @@ impl<M: Published> Subscription<M> {
         }
     }
 
+    /// What the publisher of the last message sent just before it, and what has not arrived: zenoh asked for it once. See
+    /// [`crate::Client::ask_again`].
+    pub fn gap(&self) -> Option<&Gap> {
+        self.gap.as_ref()
+    }
+
+    /// Publishers of the messages so far: a rig that starts again, alone or with its service, has another one.
+    pub fn publishers(&self) -> usize {
+        self.last.len()
+    }
+
+    /// Compares the message's number with the last one of its publisher.
+    fn count(&mut self, sample: &Sample) {
+        self.gap = None;
+        let Some((publisher, number)) = numbered(sample.clone()).origin else { return };
+        // What the first publisher sent before is history; of a later one, everything is due.
+        let is_first = self.last.is_empty();
+        let due = match self.last.insert(publisher, number) {
+            Some(last) => last.wrapping_add(1),
+            None if is_first => number,
+            None => 0,
+        };
+        if due < number {
+            self.gap = Some(Gap { publisher, numbers: due..=number - 1 });
+        }
+    }
+
     /// Messages that did not reach the reader so far.
     pub fn losses(&self) -> Losses {
         Losses {
@@ -177,14 +249,23 @@ async fn past(
         History::Last => format!("{key}/@adv/pub/**?_max=1"),
         History::All => format!("{key}/@adv/pub/**"),
     };
+    ask(session, &selector, HISTORY_TIMEOUT).await
+}
+
+/// Asks for messages that publishers keep.
+async fn ask(
+    session: &Session,
+    selector: &str,
+    patience: Duration,
+) -> Result<Vec<Numbered<EntityGlobalId, Sample>>, BusError> {
     let replies = session
-        .get(&selector)
+        .get(selector)
         .target(QueryTarget::All)
         .consolidation(ConsolidationMode::None)
         .accept_replies(ReplyKeyExpr::Any)
-        .timeout(HISTORY_TIMEOUT)
+        .timeout(patience)
         .await
-        .map_err(BusError::key(&selector))?;
+        .map_err(BusError::key(selector))?;
     let mut past = Vec::new();
     while let Ok(reply) = replies.recv_async().await {
         if let Ok(sample) = reply.into_result() {

@@ -40,8 +40,8 @@ on_topics! {
 pub(crate) struct Policy {
     /// Outgoing queue.
     pub(crate) lane: Lane,
-    /// Number of messages kept for clients that join late or missed some.
-    pub(crate) history: usize,
+    /// Messages kept for clients that join late or missed some.
+    pub(crate) kept: Kept,
     /// Each class has its own priority: zenoh holds a lock per client and priority while it waits for room, and history
     /// replies use [`Priority::Data`], so nothing here uses that.
     pub(crate) priority: Priority,
@@ -56,31 +56,52 @@ pub(crate) enum Lane {
     Updates,
 }
 
-/// Frames kept of each rig.
-const FRAMES_KEPT_MAX: usize = 300;
-/// Frames kept of all rigs of a service together: some 27 MB.
+/// Frames kept of each rig, unless the configuration says otherwise: a minute at 30 Hz. A host that was cut off from the others for
+/// half a minute needs 45 s: zenoh takes up to 10 s to notice a dead link, and tries again every 4 s.
+const FRAMES_KEPT: usize = 1_800;
+/// Frames kept of all rigs of a service together, unless the configuration says otherwise: some 30 MB.
 const FRAMES_KEPT_TOGETHER: usize = 76_800;
+/// No configuration may ask for more of each rig: 4 MiB have no room for more frames of 48 elements.
+pub(crate) const FRAMES_KEPT_MAX: usize = 16_000;
 
-/// Frames that are kept of each rig, if a service has so many: with more than 256 of them, fewer than else.
-pub(crate) fn frames_kept(rigs: usize) -> usize {
-    (FRAMES_KEPT_TOGETHER / rigs.max(1)).clamp(1, FRAMES_KEPT_MAX)
+/// Frames that are kept of each rig. Without a configured number, a service of more than 42 rigs keeps fewer of each.
+pub(crate) fn frames_kept(configured: Option<usize>, rigs: usize) -> usize {
+    configured.unwrap_or((FRAMES_KEPT_TOGETHER / rigs.max(1)).min(FRAMES_KEPT)).clamp(1, FRAMES_KEPT_MAX)
+}
+
+/// How many messages of a topic are kept for clients that join late or missed some.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kept {
+    /// As many as frames.
+    AsFrames,
+    /// The last ones.
+    Last(usize),
+}
+
+impl Kept {
+    pub(crate) const fn messages(self, frames_kept: usize) -> usize {
+        match self {
+            Self::AsFrames => frames_kept,
+            Self::Last(messages) => messages,
+        }
+    }
 }
 
 impl Policy {
     pub(crate) const fn of(topic: Topic) -> Self {
         match topic {
             Topic::SensorFrame => {
-                Self { lane: Lane::Frames, history: FRAMES_KEPT_MAX, priority: Priority::DataHigh }
+                Self { lane: Lane::Frames, kept: Kept::AsFrames, priority: Priority::DataHigh }
             }
-            Topic::RunEvent => Self::update(16_384),
-            Topic::SensorInfo | Topic::StageState | Topic::RunState | Topic::Health | Topic::SafetyState => {
-                Self::update(1)
-            }
+            Topic::StageState => Self::update(Kept::AsFrames),
+            Topic::RunEvent => Self::update(Kept::Last(16_384)),
+            Topic::SensorInfo | Topic::SafetyState => Self::update(Kept::Last(256)),
+            Topic::RunState | Topic::Health => Self::update(Kept::Last(1)),
         }
     }
 
-    const fn update(history: usize) -> Self {
-        Self { lane: Lane::Updates, history, priority: Priority::InteractiveLow }
+    const fn update(kept: Kept) -> Self {
+        Self { lane: Lane::Updates, kept, priority: Priority::InteractiveLow }
     }
 }
 

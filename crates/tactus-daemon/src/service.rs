@@ -170,6 +170,7 @@ async fn serve(mut config: ServiceConfig) -> Result<(), ServiceError> {
         listen: config.bus.listen.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         connect: config.bus.connect.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         guests: config.bus.guests.clone(),
+        frames_kept: config.bus.frames_kept,
         tls: config.bus.tls.clone().map(certificates),
     };
     let keys: Vec<_> = names.into_iter().map(Keys::new).collect();

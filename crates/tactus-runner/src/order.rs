@@ -127,8 +127,8 @@ pub fn recording(
     Ok((created?, path))
 }
 
-/// `20260131-142530`, UTC.
-fn timestamp(at: WallTime) -> String {
+/// `20260131-142530`, UTC: how the ids of runs begin.
+pub fn timestamp(at: WallTime) -> String {
     Timestamp::from_nanosecond(at.ns().into())
         .map_or_else(|_| "undated".into(), |time| time.strftime("%Y%m%d-%H%M%S").to_string())
 }

@@ -85,6 +85,11 @@ enum CliCommand {
     Reset(LeaseArgs),
     /// Show the image, the stage and the run live.
     Watch,
+    /// Record all rigs that the endpoint reaches, of one service or behind a router, each into files of its own, until Ctrl-C.
+    ///
+    /// Rigs that come later are recorded from then on, with what their services still keep. What does not arrive is asked for again; what
+    /// cannot be had is counted, told in the file, and makes the exit code 3.
+    Collect(CollectArgs),
     /// List and search the recorded runs; tag them, write notes, compare them.
     Runs(RunsArgs),
     /// Make an earlier run again, with its script, parameters and seed.
@@ -325,6 +330,25 @@ pub(crate) struct StopArgs {
     /// Reason, for the recording.
     #[arg(long, default_value = "")]
     pub(crate) reason: String,
+}
+
+/// Arguments of `collect`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct CollectArgs {
+    /// Names of the rigs; without any, all that are there or come.
+    pub(crate) rigs: Vec<String>,
+    /// Folder of the recordings, with a folder for each rig.
+    #[arg(short, long, value_name = "DIR", default_value = "collected")]
+    pub(crate) out: PathBuf,
+    /// Begin a new file after this time, in minutes.
+    #[arg(long, value_name = "MIN", default_value_t = 60.0)]
+    pub(crate) roll_min: f64,
+    /// Begin a new file beyond this size.
+    #[arg(long, value_name = "MIB", default_value_t = 256)]
+    pub(crate) roll_mib: u64,
+    /// Stop after this time; the default is to stop at Ctrl-C.
+    #[arg(long, value_name = "S")]
+    pub(crate) seconds: Option<f64>,
 }
 
 /// Arguments of `runs`.
@@ -794,6 +818,7 @@ fn dispatch(common: &Common, command: CliCommand) -> anyhow::Result<Exit> {
         CliCommand::Resume(args) => commands::control::resume(common, &args),
         CliCommand::Reset(args) => commands::control::reset(common, &args),
         CliCommand::Watch => commands::watch::watch(common),
+        CliCommand::Collect(args) => commands::collect::collect(common, &args),
         CliCommand::Runs(args) => commands::runs::runs(common, &args),
         CliCommand::Rerun(args) => commands::runs::rerun(common, &args),
         CliCommand::Record(RecordCommand::Info { files }) => commands::files::info(common, &files),

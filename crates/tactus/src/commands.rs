@@ -1,6 +1,7 @@
 //! One module for each command or group of commands.
 
 pub(crate) mod calibrate;
+pub(crate) mod collect;
 pub(crate) mod control;
 pub(crate) mod design;
 pub(crate) mod devices;

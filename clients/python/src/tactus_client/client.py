@@ -59,7 +59,10 @@ def connect(endpoint: str | None = None, rig: str | None = None) -> Client:
         services = Services(session)
         rig = rig or _the_rig(services, endpoint)
         if services.is_ambiguous(rig):
-            raise NoRig(f"several programs at {endpoint} say that they are the service of rig {rig}; connect to the service itself")
+            raise NoRig(
+                f"several programs at {endpoint} say that they are the service of rig {rig}: "
+                "give each rig a name of its own; until then, connect to its service itself"
+            )
         return Client(session, rig, services, endpoint)
     except BaseException:
         session.close()  # type: ignore[no-untyped-call]
@@ -107,7 +110,7 @@ class Client:
     def frames(self, history: int | None = None) -> FrameStream:
         """Past frames, then live ones.
 
-        Starts with the last ``history`` frames, or with all that the service keeps (10 s) if None.
+        Starts with the last ``history`` frames, or with all that the service keeps (a minute at 30 Hz) if None.
         """
         info = self.sensor_info()
         shape = (info.rows, info.cols) if info else None

@@ -1,12 +1,12 @@
 //! A client that joins late gets the history, once and in order.
 
-use crate::lab::{event, frame, open, settled};
-use tactus_bus::{Client, History, Losses};
+use crate::lab::{event, frame, open, open_with, settled};
+use tactus_bus::{BusConfig, Client, History, Losses};
 use tactus_schema::pb;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_late_joiner_gets_the_last_ten_seconds_of_frames_and_then_the_present() {
-    let service = open("bench", &[]).await;
+async fn a_late_joiner_gets_the_frames_that_are_kept_and_then_the_present() {
+    let service = open_with("bench", BusConfig { frames_kept: Some(300), ..BusConfig::default() }).await;
     let publisher = service.bus.publisher();
     let client = Client::connect(&service.endpoint, Some("bench")).await.unwrap();
     let mut early = client.subscribe::<pb::Frame>(History::All).await.unwrap();

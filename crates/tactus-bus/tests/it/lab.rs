@@ -37,14 +37,15 @@ pub(crate) async fn open(rig: &str, connect: &[Endpoint]) -> Service {
 
 /// As [`open`], for services of other rigs too.
 pub(crate) async fn open_for(rig: &str, guests: &[&str], connect: &[Endpoint]) -> Service {
+    let guests = guests.iter().map(|&guest| guest.to_owned()).collect();
+    open_with(rig, BusConfig { guests, connect: connect.to_vec(), ..BusConfig::default() }).await
+}
+
+/// As [`open`], with another configuration, but for its place.
+pub(crate) async fn open_with(rig: &str, config: BusConfig) -> Service {
     loop {
         let endpoint = free_endpoint();
-        let config = BusConfig {
-            listen: vec![endpoint.clone()],
-            connect: connect.to_vec(),
-            guests: guests.iter().map(|&guest| guest.to_owned()).collect(),
-            ..BusConfig::default()
-        };
+        let config = BusConfig { listen: vec![endpoint.clone()], ..config.clone() };
         match Bus::open(&config, Keys::new(rig)).await {
             Ok((bus, calls)) => return Service { bus, calls, endpoint },
             // Somebody else took the port meanwhile.
@@ -67,14 +68,19 @@ pub(crate) async fn raw_session(endpoint: &Endpoint) -> zenoh::Session {
 pub(crate) async fn router() -> (zenoh::Session, Endpoint) {
     loop {
         let endpoint = free_endpoint();
-        let mut config = zenoh::Config::default();
-        config.insert_json5("mode", "\"router\"").unwrap();
-        config.insert_json5("scouting/multicast/enabled", "false").unwrap();
-        config.insert_json5("listen/endpoints", &format!("[\"{endpoint}\"]")).unwrap();
-        if let Ok(session) = zenoh::open(config).await {
+        if let Ok(session) = router_at(&endpoint).await {
             return (session, endpoint);
         }
     }
+}
+
+/// As [`router`], at a place where nothing listens.
+pub(crate) async fn router_at(endpoint: &Endpoint) -> Result<zenoh::Session, zenoh::Error> {
+    let mut config = zenoh::Config::default();
+    config.insert_json5("mode", "\"router\"").unwrap();
+    config.insert_json5("scouting/multicast/enabled", "false").unwrap();
+    config.insert_json5("listen/endpoints", &format!("[\"{endpoint}\"]")).unwrap();
+    zenoh::open(config).await
 }
 
 /// A client of a router, which may take its time on a busy machine.
@@ -151,6 +157,11 @@ impl Link {
     /// Stops passing on data from the service.
     pub(crate) fn stand_still(&self) {
         self.state.send_replace(LinkState::Still);
+    }
+
+    /// Breaks all connections, and each new one, until the link flows again.
+    pub(crate) fn cut(&self) {
+        self.state.send_replace(LinkState::Broken);
     }
 
     /// Passes on all data again.

@@ -4,6 +4,7 @@ mod access;
 mod churn;
 mod commands;
 mod history;
+mod hosts;
 mod lab;
 mod liveliness;
 mod rigs;

@@ -79,7 +79,9 @@ impl TimelineBuilder {
 
     fn event(&mut self, event: pb::RunEvent) {
         let at = MonoTime::from_ns(event.t_mono_ns);
-        let (next, since) = self.events.last().map_or((0, MonoTime::from_ns(i64::MIN)), |last| {
+        // A collection has events of several runs, and of its own.
+        let earlier = self.events.iter().rev().find(|earlier| earlier.run_id == event.run_id);
+        let (next, since) = earlier.map_or((0, MonoTime::from_ns(i64::MIN)), |last| {
             (last.seq.saturating_add(1), MonoTime::from_ns(last.t_mono_ns))
         });
         if event.seq > next {

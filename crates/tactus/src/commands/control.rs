@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use tactus_bus::BusError;
 use tactus_schema::key::Command;
 use tactus_schema::{pb, with_message};
 
@@ -31,28 +32,38 @@ pub(crate) fn status(common: &Common) -> anyhow::Result<Exit> {
     })
 }
 
-fn show_all(common: &Common, answers: &[(String, Option<pb::CommandReply>)]) {
+fn show_all(common: &Common, answers: &[(String, Result<pb::CommandReply, BusError>)]) {
     if common.json {
-        let of_rig = |(rig, reply): &(String, Option<pb::CommandReply>)| match reply {
-            Some(reply) => to_json(reply),
-            None => json!({ "rig": rig, "problem": NO_ANSWER }),
+        let of_rig = |(rig, reply): &(String, Result<pb::CommandReply, BusError>)| match reply {
+            Ok(reply) => to_json(reply),
+            Err(error) => json!({ "rig": rig, "problem": problem(error) }),
         };
         println!("{}", json!({ "rigs": answers.iter().map(of_rig).collect::<Vec<_>>() }));
         return;
     }
-    let rows: Vec<_> = answers.iter().map(|(rig, reply)| row(rig, reply.as_ref())).collect();
+    let rows: Vec<_> = answers.iter().map(|(rig, reply)| row(rig, reply)).collect();
     print_table_cut(&["RIG", "STATE", "FRAMES", "LOST", "LEASE", "WHAT"], &rows);
     say_next("`tactus status --rig NAME` shows one in detail");
 }
 
-const NO_ANSWER: &str = "it does not answer";
+/// Why a rig has no state to show.
+fn problem(error: &BusError) -> String {
+    if matches!(error, BusError::NoAnswer { .. }) {
+        "it does not answer".to_owned()
+    } else {
+        error.to_string()
+    }
+}
 
 /// A rig in a line: its state, and what a person should know first.
-fn row(rig: &str, reply: Option<&pb::CommandReply>) -> Vec<String> {
-    let reply = reply.cloned().unwrap_or_else(|| pb::CommandReply {
-        health: Some(pb::Health { problem: NO_ANSWER.to_owned(), ..Default::default() }),
-        ..Default::default()
-    });
+fn row(rig: &str, reply: &Result<pb::CommandReply, BusError>) -> Vec<String> {
+    let reply = match reply {
+        Ok(reply) => reply.clone(),
+        Err(error) => pb::CommandReply {
+            health: Some(pb::Health { problem: problem(error), ..Default::default() }),
+            ..Default::default()
+        },
+    };
     let lease = holder(&reply).map_or_else(|| "-".to_owned(), |lease| lease.holder.clone());
     let (state, health) = (reply.state.unwrap_or_default(), reply.health.unwrap_or_default());
     let (word, what) = if !health.problem.is_empty() {

@@ -76,7 +76,7 @@ async fn show(client: &Client) -> anyhow::Result<Exit> {
         stages: client.subscribe(History::Last).await?,
         states: client.subscribe(History::Last).await?,
         events: client.subscribe(History::All).await?,
-        safety: client.subscribe(History::All).await?,
+        safety: client.subscribe(History::Last).await?,
         health: client.subscribe(History::Last).await?,
     };
     let mut terminal =

@@ -1,0 +1,347 @@
+//! Services on several hosts, joined by a router, and a collector that records all their rigs.
+//!
+//! `just hosts` sets `TACTUS_ZENOHD`, and a host is then a network namespace, the router stock, and a cut a link that is down.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use rustix::process::Signal;
+use serde_json::Value;
+use tactus_e2e::{DEADLINE, Link, Process, binary, free_endpoint, repository, tactus};
+use tactus_record::{Entry, Message};
+use tactus_schema::pb::run_event::Event;
+use tempfile::TempDir;
+use tokio::runtime::Runtime;
+
+/// Time between two looks at files that grow.
+const AGAIN: Duration = Duration::from_millis(100);
+
+/// A service of one simulated rig on a host of its own, which a router joins to others.
+struct Host {
+    folder: TempDir,
+    endpoint: String,
+    /// In which its programs run, if it is one.
+    namespace: Option<String>,
+}
+
+impl Host {
+    fn new(rig: &str, router: &str, frames_kept: usize) -> Self {
+        Self::at(free_endpoint(), None, (rig, router, frames_kept))
+    }
+
+    fn at(endpoint: String, namespace: Option<String>, (rig, router, kept): (&str, &str, usize)) -> Self {
+        let folder = TempDir::new().unwrap();
+        let shipped = fs::read_to_string(repository("config/rigs/sim.toml")).unwrap();
+        let named = shipped.replace("name = \"sim\"", &format!("name = \"{rig}\""));
+        fs::write(folder.path().join("rig.toml"), named).unwrap();
+        let bus = format!("listen = [\"{endpoint}\"]\nconnect = [\"{router}\"]\nframes_kept = {kept}\n");
+        let config = format!("rig = \"rig.toml\"\nrecordings = \"runs\"\n[bus]\n{bus}");
+        fs::write(folder.path().join("tactusd.toml"), config).unwrap();
+        Self { folder, endpoint, namespace }
+    }
+
+    fn start(&self, program: &str, args: &[&str]) -> Process {
+        match &self.namespace {
+            Some(namespace) => Process::start_in(namespace, &binary(program), self.folder.path(), args),
+            None => Process::start(program, self.folder.path(), args),
+        }
+    }
+
+    fn serve(&self) -> Process {
+        let mut daemon = self.start("tactusd", &["--config", "tactusd.toml"]);
+        daemon.wait_for("ready: frames flow");
+        daemon
+    }
+
+    /// Starts `tactus` as a client of its service.
+    fn tactus(&self, args: &[&str]) -> Process {
+        self.start("tactus", &[&["--endpoint", &self.endpoint], args].concat())
+    }
+
+    /// Returns when a client of this host has seen so many frames; gives the number of the last one.
+    fn wait_for_frames(&self, frames: usize) -> u64 {
+        let mut viewer = self.tactus(&["watch", "--json"]);
+        (0..frames).map(|_| seq(&viewer.wait_for("\"seq\""))).last().unwrap()
+    }
+}
+
+/// Number of a frame in a line of `watch --json`.
+fn seq(line: &str) -> u64 {
+    let frame: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));
+    frame["seq"].as_u64().unwrap()
+}
+
+/// A router in this process.
+fn router(runtime: &Runtime) -> (zenoh::Session, String) {
+    let endpoint = free_endpoint();
+    let mut config = zenoh::Config::default();
+    config.insert_json5("mode", "\"router\"").unwrap();
+    config.insert_json5("scouting/multicast/enabled", "false").unwrap();
+    config.insert_json5("listen/endpoints", &format!("[\"{endpoint}\"]")).unwrap();
+    (runtime.block_on(async { zenoh::open(config).await.unwrap() }), endpoint)
+}
+
+fn collect(folder: &Path, endpoint: &str, args: &[&str]) -> Process {
+    Process::start("tactus", folder, &[&["--endpoint", endpoint], &COLLECT[..], args].concat())
+}
+
+const COLLECT: [&str; 4] = ["--json", "collect", "--out", "collected"];
+
+/// Ends the collector, and returns its exit code and what it says of the rig.
+fn ended(collector: Process, rig: &str) -> (Option<i32>, Value) {
+    collector.signal(Signal::INT);
+    let (code, said) = collector.wait();
+    let summary = said.lines().find(|line| line.starts_with('{')).unwrap_or_else(|| panic!("{said}"));
+    let summary: Value = serde_json::from_str(summary).unwrap();
+    let of = |one: &&Value| one["rig"] == rig;
+    let totals = summary["rigs"].as_array().unwrap().iter().find(of);
+    (code, totals.unwrap_or_else(|| panic!("no {rig}: {said}")).clone())
+}
+
+/// The recordings in a folder, in order.
+fn recordings(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let mut found: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    found.retain(|path| path.extension().is_some_and(|extension| extension == "mcap"));
+    found.sort();
+    found
+}
+
+/// Numbers of the recorded frames, and frames that gaps say are lost.
+fn recorded(files: &[PathBuf]) -> (Vec<u64>, u64) {
+    let (mut seqs, mut lost) = (Vec::new(), 0);
+    for file in files {
+        for entry in tactus_record::read(file).unwrap() {
+            match entry.unwrap() {
+                Entry::Message { message: Message::Frame(frame), .. } => seqs.push(frame.seq),
+                Entry::Message { message: Message::Event(event), .. } => {
+                    if let Some(Event::Gap(gap)) = &event.event {
+                        lost += gap.frames_lost;
+                    }
+                }
+                Entry::Message { .. } | Entry::Run(_) | Entry::Attachment(_) => {}
+            }
+        }
+    }
+    (seqs, lost)
+}
+
+/// Returns once the rig's collected files have that frame.
+fn wait_until_collected(folder: &Path, rig: &str, seq: u64) {
+    let until = Instant::now() + DEADLINE;
+    let collected = folder.join("collected").join(rig);
+    // A file that is just being created is no recording yet.
+    let has = |file: &PathBuf| {
+        tactus_record::read(file).is_ok() && recorded(std::slice::from_ref(file)).0.last() >= Some(&seq)
+    };
+    while !recordings(&collected).last().is_some_and(has) {
+        assert!(Instant::now() < until, "frame {seq} of {rig} is not collected");
+        std::thread::sleep(AGAIN);
+    }
+}
+
+/// All frames that the files have, each once and in order; what is missing between them.
+fn missing(seqs: &[u64]) -> u64 {
+    assert!(seqs.is_sorted_by(|one, next| one < next), "{seqs:?}");
+    let (first, last) = (seqs.first().unwrap(), seqs.last().unwrap());
+    last - first + 1 - seqs.len() as u64
+}
+
+#[test]
+fn rigs_of_all_hosts_are_collected_and_a_cut_leaves_no_gap() {
+    let runtime = Runtime::new().unwrap();
+    let (_router, router) = router(&runtime);
+    let link = Link::to(&router).unwrap();
+    let folder = TempDir::new().unwrap();
+    let left = Host::new("left", &router, 1_800);
+    let _left = left.serve();
+    // It comes late, and gets what is kept.
+    let before = left.wait_for_frames(15);
+    let mut collector = collect(folder.path(), &link.endpoint, &["--roll-min", "0.05"]);
+    collector.wait_for("left: found");
+
+    // Another host comes, and everything reaches both through the router.
+    let right = Host::new("right", &router, 1_800);
+    let _right = right.serve();
+    collector.wait_for("right: found");
+    let status = tactus(folder.path(), &["--endpoint", &router, "status", "--json"]);
+    let rigs: Vec<_> =
+        status.json()["rigs"].as_array().unwrap().iter().map(|rig| rig["rig"].clone()).collect();
+    assert_eq!(rigs, ["left", "right"], "{status:?}");
+    let web = ["--endpoint", &router, "--rig", "right", "--listen", "127.0.0.1:0"];
+    Process::start("tactus-web", folder.path(), &web).wait_for("connected");
+    wait_until_collected(folder.path(), "right", 0);
+
+    link.cut();
+    collector.wait_for("gone");
+    left.wait_for_frames(90);
+    link.restore();
+    collector.wait_for("there again");
+    let last = left.wait_for_frames(15);
+    wait_until_collected(folder.path(), "left", last);
+
+    let (code, totals) = ended(collector, "left");
+    assert_eq!(
+        (code, &totals["frames_lost"], &totals["problem"]),
+        (Some(0), &0.into(), &Value::Null),
+        "{totals}"
+    );
+    for rig in ["left", "right"] {
+        let files = recordings(&folder.path().join("collected").join(rig));
+        let (seqs, lost) = recorded(&files);
+        assert_eq!((missing(&seqs), lost), (0, 0), "{rig}");
+        assert!(rig == "right" || seqs[0] < before, "{seqs:?}");
+        // Files end at the time that was asked for, and each stands by itself.
+        assert!(files.len() > 1, "{files:?}");
+        for file in files {
+            let info =
+                tactus(folder.path(), &["record", "info", "--json", &file.display().to_string()]).json();
+            assert_eq!((&info["rig"], &info["exit_status"]), (&rig.into(), &"done".into()), "{info}");
+            assert_eq!(info["completeness"]["state"], "complete", "{info}");
+            let table = file.with_extension("parquet").display().to_string();
+            let exported = tactus(folder.path(), &["export", &file.display().to_string(), "--out", &table]);
+            assert_eq!(exported.code, Some(0), "{exported:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_longer_kept_after_a_cut_is_counted_told_and_recorded() {
+    let runtime = Runtime::new().unwrap();
+    let (_router, router) = router(&runtime);
+    let link = Link::to(&router).unwrap();
+    let folder = TempDir::new().unwrap();
+    let host = Host::new("left", &router, 20);
+    let _daemon = host.serve();
+    // A name that nobody has.
+    let mut collector = collect(folder.path(), &link.endpoint, &["left", "nobody"]);
+    collector.wait_for("left: found");
+    let before = host.wait_for_frames(5);
+    wait_until_collected(folder.path(), "left", before);
+
+    link.cut();
+    collector.wait_for("left: gone");
+    host.wait_for_frames(60);
+    link.restore();
+    collector.wait_for("frames before");
+    let last = host.wait_for_frames(5);
+    wait_until_collected(folder.path(), "left", last);
+
+    let (code, totals) = ended(collector, "left");
+    let (seqs, lost) = recorded(&recordings(&folder.path().join("collected/left")));
+    assert_eq!(code, Some(3), "{totals}");
+    assert!(lost >= 30, "{totals}");
+    assert_eq!((missing(&seqs), totals["frames_lost"].as_u64()), (lost, Some(lost)), "{totals}");
+}
+
+/// Two hosts with a cable between them: network namespaces, which nothing else reaches.
+struct Cable {
+    near: String,
+    far: String,
+}
+
+const NEAR: &str = "10.97.0.1/24";
+const FAR: &str = "10.97.0.2/24";
+const ROUTER: &str = "tcp/10.97.0.2:7447";
+
+impl Cable {
+    fn new() -> Self {
+        let id = std::process::id();
+        let cable = Self { near: format!("tactus-near-{id}"), far: format!("tactus-far-{id}") };
+        for host in [&cable.near, &cable.far] {
+            ip(&["netns", "add", host]);
+        }
+        let ends = ["type", "veth", "peer", "name", "cable", "netns", &cable.far];
+        ip(&[&["link", "add", "cable", "netns", &cable.near], &ends[..]].concat());
+        for (host, address) in [(&cable.near, NEAR), (&cable.far, FAR)] {
+            ip(&["-n", host, "address", "add", address, "dev", "cable"]);
+            ip(&["-n", host, "link", "set", "cable", "up"]);
+            ip(&["-n", host, "link", "set", "lo", "up"]);
+        }
+        cable
+    }
+
+    /// What has passed it so far, both ways, with all headers.
+    fn bytes(&self) -> u64 {
+        let output = Command::new("ip")
+            .args(["-n", &self.near, "-s", "-j", "link", "show", "cable"])
+            .output()
+            .unwrap();
+        let shown: Value = serde_json::from_slice(&output.stdout).unwrap();
+        ["rx", "tx"].iter().map(|way| shown[0]["stats64"][way]["bytes"].as_u64().unwrap()).sum()
+    }
+
+    fn set(&self, state: &str) {
+        ip(&["-n", &self.near, "link", "set", "cable", state]);
+    }
+}
+
+impl Drop for Cable {
+    fn drop(&mut self) {
+        for host in [&self.near, &self.far] {
+            drop(Command::new("ip").args(["netns", "delete", host]).status());
+        }
+    }
+}
+
+fn ip(args: &[&str]) {
+    let status = Command::new("ip").args(args).status().unwrap();
+    assert!(status.success(), "ip {args:?}: {status}");
+}
+
+#[test]
+fn a_host_that_is_cut_off_for_half_a_minute_loses_nothing_that_is_kept_and_nothing_silently() {
+    let Some(zenohd) = std::env::var_os("TACTUS_ZENOHD") else { return };
+    let cable = Cable::new();
+    let lab = TempDir::new().unwrap();
+    let in_lab = |program: &Path, args: &[&str]| Process::start_in(&cable.far, program, lab.path(), args);
+    let _router = in_lab(Path::new(&zenohd), &["--no-multicast-scouting", "--listen", ROUTER]);
+    // A minute, and 20 s.
+    for (rig, kept, is_whole) in [("long", 1_800, true), ("short", 600, false)] {
+        let local = "tcp/127.0.0.1:7447".to_owned();
+        let host = Host::at(local, Some(cable.near.clone()), (rig, ROUTER, kept));
+        let mut daemon = host.serve();
+        // Its own recording is what the collected one is compared with.
+        let reset = host.tactus(&["reset"]).wait();
+        assert_eq!(reset.0, Some(0), "{}", reset.1);
+        fs::write(host.folder.path().join("reads.star"), "def run(rig):\n    tare()\n    wait(75.0)\n")
+            .unwrap();
+        // The service has joined the router by now or does so soon.
+        while in_lab(&binary("tactus"), &["--endpoint", ROUTER, "status", "--rig", rig]).wait().0 != Some(0) {
+        }
+        let args = [&["--endpoint", ROUTER], &COLLECT[..], &[rig]].concat();
+        let mut collector = in_lab(&binary("tactus"), &args);
+        collector.wait_for("found");
+        // At rest, with one who hears everything: what a rig costs the network.
+        host.wait_for_frames(60);
+        let before = cable.bytes();
+        host.wait_for_frames(300);
+        println!("{} bytes/s on the cable at 30 Hz", (cable.bytes() - before) / 10);
+        let run = host.tactus(&["run", "reads.star", "--no-report"]);
+        daemon.wait_for("run accepted");
+        host.wait_for_frames(60);
+
+        cable.set("down");
+        host.wait_for_frames(30 * 30);
+        cable.set("up");
+
+        let (code, said) = run.wait();
+        assert_eq!(code, Some(0), "{said}");
+        let runs = fs::read_dir(host.folder.path().join("runs")).unwrap();
+        let run = runs.map(|run| run.unwrap().path()).find(|path| path.is_dir()).unwrap();
+        let own: BTreeSet<_> = recorded(&recordings(&run)).0.into_iter().collect();
+        wait_until_collected(lab.path(), rig, *own.last().unwrap());
+        let (code, totals) = ended(collector, rig);
+        let (seqs, lost) = recorded(&recordings(&lab.path().join("collected").join(rig)));
+        println!("{totals}");
+        assert_eq!((missing(&seqs), totals["frames_lost"].as_u64()), (lost, Some(lost)), "{totals}");
+        assert_eq!((lost == 0, code), (is_whole, Some(if is_whole { 0 } else { 3 })), "{totals}");
+        let collected: BTreeSet<_> = seqs.into_iter().collect();
+        let not_collected = own.difference(&collected).count() as u64;
+        assert!(not_collected <= lost && own.len() > 60 * 30, "{not_collected} of {}, {totals}", own.len());
+    }
+}
