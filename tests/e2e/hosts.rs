@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use rustix::process::Signal;
 use serde_json::Value;
 use tactus_e2e::{DEADLINE, Link, Process, binary, free_endpoint, repository, tactus};
-use tactus_record::{Entry, Message};
+use tactus_record::{Entry, Message, Timeline};
 use tactus_schema::pb::run_event::Event;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
@@ -166,7 +166,7 @@ fn rigs_of_all_hosts_are_collected_and_a_cut_leaves_no_gap() {
 
     // Another host comes, and everything reaches both through the router.
     let right = Host::new("right", &router, 1_800);
-    let _right = right.serve();
+    let mut serving_right = right.serve();
     collector.wait_for("right: found");
     let status = tactus(folder.path(), &["--endpoint", &router, "status", "--json"]);
     let rigs: Vec<_> =
@@ -175,14 +175,25 @@ fn rigs_of_all_hosts_are_collected_and_a_cut_leaves_no_gap() {
     let web = ["--endpoint", &router, "--rig", "right", "--listen", "127.0.0.1:0"];
     Process::start("tactus-web", folder.path(), &web).wait_for("connected");
     wait_until_collected(folder.path(), "right", 0);
+    let at_router = ["--endpoint", &router, "--rig", "right"];
+    let reset = tactus(folder.path(), &[&at_router[..], &["reset"]].concat());
+    assert_eq!(reset.code, Some(0), "{reset:?}");
+    fs::write(folder.path().join("reads.star"), "def run(rig):\n    tare()\n    wait(6.0)\n").unwrap();
+    let run = [&at_router[..], &["run", "reads.star", "--no-report"]].concat();
+    let run = Process::start("tactus", folder.path(), &run);
+    serving_right.wait_for("run accepted");
+    right.wait_for_frames(30);
 
     link.cut();
     collector.wait_for("gone");
     left.wait_for_frames(90);
     link.restore();
     collector.wait_for("there again");
-    let last = left.wait_for_frames(15);
-    wait_until_collected(folder.path(), "left", last);
+    let (code, said) = run.wait();
+    assert_eq!(code, Some(0), "{said}");
+    for (rig, host) in [("left", &left), ("right", &right)] {
+        wait_until_collected(folder.path(), rig, host.wait_for_frames(15));
+    }
 
     let (code, totals) = ended(collector, "left");
     assert_eq!(
@@ -206,6 +217,23 @@ fn rigs_of_all_hosts_are_collected_and_a_cut_leaves_no_gap() {
             let exported = tactus(folder.path(), &["export", &file.display().to_string(), "--out", &table]);
             assert_eq!(exported.code, Some(0), "{exported:?}");
         }
+    }
+    assert_each_file_has_the_run_of_its_frames(&recordings(&folder.path().join("collected/right")));
+}
+
+/// A file that begins within a run has all of the run's events before it.
+#[track_caller]
+fn assert_each_file_has_the_run_of_its_frames(files: &[PathBuf]) {
+    let timelines: Vec<_> = files.iter().map(|file| Timeline::read(file).unwrap()).collect();
+    assert!(!timelines.iter().any(Timeline::lacks_events), "{files:?}");
+    let of_run = |timeline: &Timeline| -> Vec<u64> {
+        let own = timeline.run().run_id.clone();
+        timeline.events().iter().filter(|event| event.run_id != own).map(|event| event.seq).collect()
+    };
+    let with_run: Vec<_> = timelines.iter().map(of_run).filter(|seqs| !seqs.is_empty()).collect();
+    assert!(with_run.len() > 1, "the run is in one file: {files:?}");
+    for seqs in with_run {
+        assert!(seqs.iter().copied().eq(0..seqs.len() as u64), "{seqs:?}");
     }
 }
 

@@ -99,8 +99,8 @@ impl Gap {
         u64::from(self.numbers.end() - self.numbers.start()) + 1
     }
 
-    /// Asks the publisher for them. If it has none of them, it is asked for its last message, which shows whether it answers: `None` if
-    /// it does not.
+    /// Asks the publisher for them; `None` if it does not answer, or not to the end. It forgets the oldest messages first, and so answers
+    /// with the last of them if it has any; if not, its very last message shows that it is there.
     pub(crate) async fn ask<M: Published>(
         &self,
         session: &Session,
@@ -113,7 +113,12 @@ impl Gap {
         let mut found = ask(session, &format!("{key}?_sn={first}..{last}"), patience).await?;
         // Nobody else may answer in its place.
         found.retain(|Numbered { origin, .. }| origin.is_some_and(|(by, _)| by == publisher));
-        if found.is_empty() && ask(session, &format!("{key}?_max=1"), patience).await?.is_empty() {
+        let is_answered = if found.is_empty() {
+            !ask(session, &format!("{key}?_max=1"), patience).await?.is_empty()
+        } else {
+            found.iter().any(|Numbered { origin, .. }| *origin == Some((publisher, last)))
+        };
+        if !is_answered {
             return Ok(None);
         }
         let read = |found: Numbered<_, Sample>| M::decode(&*found.item.payload().to_bytes()).ok();

@@ -5,7 +5,10 @@
 use std::path::Path;
 
 use tactus_record::{Completeness, Timeline, confirmed_presses, info, recover, rows};
-use tactus_schema::{MonoTime, pb::run_event::Event};
+use tactus_schema::{
+    MonoTime,
+    pb::{RunEvent, run_event::Event},
+};
 
 use crate::synthetic::{Fed, Plan, Run};
 
@@ -81,4 +84,23 @@ fn frames_and_events_at_the_ends_of_time_are_read() {
     assert!(info(&path).unwrap().duration_s > 0.0);
     drop(rows::visit(&[&path], |_, _| {}));
     assert!(recover(&path, dir.path().join("out.mcap")).unwrap().closed);
+}
+
+#[test]
+fn events_of_several_runs_count_each_by_itself() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("run.mcap");
+    let mut run = Plan::short(1).make();
+    let (at, middle) = run
+        .fed
+        .iter()
+        .enumerate()
+        .filter_map(|(at, fed)| if let Fed::Event(event) = fed { Some((at, event.clone())) } else { None })
+        .nth(3)
+        .unwrap();
+    // What a collection says of itself, between two events of the run.
+    let other = RunEvent { seq: 0, run_id: "collection".into(), ..middle };
+    run.fed.insert(at + 1, Fed::Event(other));
+    run.record(&path).unwrap();
+    assert!(!Timeline::read(&path).unwrap().lacks_events());
 }

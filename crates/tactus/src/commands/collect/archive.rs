@@ -15,7 +15,6 @@ use tactus_schema::key::Topic;
 use tactus_schema::{Frame, Rig, pb};
 use tokio::sync::mpsc::{self, error::TrySendError};
 
-use super::keeper::Ended;
 use crate::exit::{Exit, Failure};
 use files::Files;
 
@@ -63,6 +62,10 @@ pub(super) enum Heard {
     /// So many messages, in all, were not the service's or not readable.
     Foreign(u64),
 }
+
+/// The collection ends, or nothing can be written any more.
+#[derive(Debug)]
+pub(super) struct Ended;
 
 /// A rig as its service describes it.
 #[derive(Debug)]

@@ -8,7 +8,7 @@ use tactus_schema::{Rig, pb};
 use tokio::sync::watch;
 use tokio::time::sleep;
 
-use super::archive::{Described, Heard, Place};
+use super::archive::{Described, Ended, Heard, Place};
 use crate::connection;
 use crate::exit::in_words;
 
@@ -36,10 +36,6 @@ struct Topics {
     safety: Subscription<pb::SafetyEvent>,
     frames: Subscription<pb::Frame>,
 }
-
-/// The collection ends, or nothing can be written any more.
-#[derive(Debug)]
-pub(super) struct Ended;
 
 impl Keeper {
     pub(super) fn new(client: Client, place: Place, ending: watch::Receiver<bool>) -> Self {
