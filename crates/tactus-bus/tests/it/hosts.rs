@@ -1,4 +1,5 @@
 //! Services on several hosts, joined by a router, and links between them that are cut.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::time::Duration;
 

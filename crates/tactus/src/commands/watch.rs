@@ -31,7 +31,7 @@ const WHO: &str = "watch";
 pub(crate) fn watch(common: &Common) -> anyhow::Result<Exit> {
     connection::runtime()?.block_on(async {
         let client = connection::require(common).await?;
-        if common.json { stream(&client).await } else { show(&client).await }
+        if common.json { stream(&client).await } else { Box::pin(show(&client)).await }
     })
 }
 
