@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls hosts features vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
+nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls hosts features vm discovery-slice gpu fleet (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -22,7 +22,7 @@ quick:
     set -euo pipefail
     cargo fmt --all --check
     crates=()
-    for manifest in $( (git diff --name-only HEAD; git ls-files --others --exclude-standard) | grep -v '^fuzz/' |
+    for manifest in $( (git diff --name-only HEAD; git ls-files --others --exclude-standard) | grep -vE '^(fuzz|fleet)/' |
         while read -r path; do
             while [ "$path" != . ] && [ ! -f "$path/Cargo.toml" ]; do path=$(dirname "$path"); done
             [ "$path" = . ] || echo "$path/Cargo.toml"
@@ -150,6 +150,22 @@ features-tools:
     test -d {{ tools }}/features || python3 -m venv {{ tools }}/features
     {{ tools }}/features/bin/pip install --quiet --no-compile --requirement tests/features/requirements.txt
     cd tests/features && PATH="{{ tools }}/features/bin:$PATH" npm install --silent --no-fund --no-audit --no-package-lock
+
+# Many recordings in one place, in a workspace of its own: lints, tests, licences, and DuckDB and polars on the same files. Some five minutes
+# the first time.
+fleet: deny-tool fleet-tools
+    cd fleet && cargo fmt --check
+    cd fleet && cargo clippy --all-targets -- -D warnings
+    cd fleet && cargo test
+    PATH="{{ tools }}/bin:$PATH" cargo deny --manifest-path fleet/Cargo.toml --config deny.toml check licenses bans sources
+    cd fleet && cargo build --example synthetic_tables
+    TACTUS_FLEET_PROGRAMS=$PWD/fleet/target/debug {{ tools }}/fleet/bin/pytest -q fleet/tests/python
+
+# A virtual environment with DuckDB and polars.
+[private]
+fleet-tools:
+    test -d {{ tools }}/fleet || python3 -m venv {{ tools }}/fleet
+    {{ tools }}/fleet/bin/pip install --quiet --no-compile --requirement fleet/tests/python/requirements.txt
 
 # Runs the programs of `examples/`, and plans every shipped experiment.
 examples: build

@@ -8,6 +8,7 @@
 //! | `sh` | run to its end, which must be exit code 0; `exit=3` expects another code |
 //! | `sh beside=TEXT` | started, and left running to the page's end as soon as it has printed TEXT: another terminal |
 //! | `sh not-run=REASON` | not run |
+//! | `sh by=fleet` | run by `just fleet`, which builds that program |
 //! | `python file=NAME`, `toml file=NAME` | written into the folder |
 //! | `toml in=NAME` | put into a file of the folder, in place of the keys that it has |
 //! | `text` | what the block before it prints; `...` stands for anything |
@@ -165,7 +166,7 @@ impl Block {
     }
 
     fn is_run(&self) -> bool {
-        self.is_shell() && self.word("not-run").is_none()
+        self.is_shell() && self.word("not-run").is_none() && self.word("by").is_none()
     }
 
     /// The value of `name=value` in the block's first line.

@@ -1,0 +1,284 @@
+//! From recordings and measurement tables to one Parquet file per run.
+//!
+//! Threads take one job after the other: a table, or a recording with those that go on with its run. A job reads its rows as a stream,
+//! and holds one row group of them and 32 MiB of the file at most; what is beyond lies in an unnamed file of the system's temporary folder. A file appears in the
+//! fleet only when it is whole, so a killed ingest leaves no half of one, and the next goes on where it ended.
+
+mod found;
+mod run_writer;
+
+use std::{
+    fmt,
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+};
+
+use jiff::civil::Date;
+use serde::Serialize;
+use tactus_record::{RowsError, rows};
+use tactus_schema::{Rig, table::RowView};
+use tokio::runtime::Handle;
+
+use crate::{
+    Place,
+    output::{in_mb, number_of},
+    progress::Now,
+};
+use found::{Job, Source, found};
+use run_writer::{RunWriter, WriteError, Written};
+
+/// How runs are ingested.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// How many jobs are done at a time.
+    pub threads: NonZeroUsize,
+    /// Date of runs whose files and ids do not tell theirs.
+    pub date: Option<Date>,
+}
+
+/// What was ingested.
+#[derive(Debug, Clone, Serialize)]
+pub struct Ingested {
+    /// Form of this summary.
+    pub schema: &'static str,
+    /// The fleet.
+    pub to: String,
+    /// Runs that were written.
+    pub runs_written: u64,
+    /// Runs that were there already.
+    pub runs_kept: u64,
+    /// Rows that were written.
+    pub rows: u64,
+    /// Bytes that were written.
+    pub bytes: u64,
+    /// What readers of the rows must know, a sentence each.
+    pub warnings: Vec<String>,
+    /// Files that could not be ingested, and why. The others are.
+    pub failed: Vec<FailedFile>,
+}
+
+/// A file that could not be ingested.
+#[derive(Debug, Clone, Serialize)]
+pub struct FailedFile {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub problem: String,
+}
+
+/// Why nothing was ingested.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
+pub enum IngestError {
+    /// A path cannot be read.
+    #[error("{}: {source}", path.display())]
+    Path { path: PathBuf, source: std::io::Error },
+    /// There is nothing to ingest.
+    #[error("there is no recording (.mcap) in {}", paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", "))]
+    Nothing { paths: Vec<PathBuf> },
+}
+
+/// Why a job was not done.
+#[derive(Debug, thiserror::Error)]
+enum JobError {
+    #[error(transparent)]
+    Rows(#[from] RowsError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error("it holds no frame")]
+    NoFrame,
+}
+
+const SCHEMA: &str = "tactus.fleet.ingest/1";
+
+/// Writes the runs of recordings and measurement tables into a fleet. Folders are searched for recordings. A run that is there already, made
+/// of a file of the same size, is kept.
+///
+/// Recordings that go on with another's run are read with it, if both are given: presses that were done again are left out.
+///
+/// # Errors
+/// If a path cannot be read, or there is no recording at all. A file that cannot be ingested stops no other: [`Ingested::failed`] lists it.
+pub fn ingest(
+    runtime: &Handle,
+    paths: &[PathBuf],
+    place: &Place,
+    options: &Options,
+    progress: &(dyn Fn(Now) + Sync),
+) -> Result<Ingested, IngestError> {
+    let (jobs, unreadable) = found(paths)?;
+    let shared = Shared {
+        next: AtomicUsize::new(0),
+        now: Mutex::new(Now {
+            files: 0,
+            files_all: jobs.iter().map(|job| job.sources.len()).sum(),
+            bytes: 0,
+            bytes_all: jobs.iter().flat_map(|job| &job.sources).map(|source| source.bytes).sum(),
+        }),
+        ingested: Mutex::new(Ingested {
+            schema: SCHEMA,
+            to: place.url().to_string(),
+            runs_written: 0,
+            runs_kept: 0,
+            rows: 0,
+            bytes: 0,
+            warnings: Vec::new(),
+            failed: unreadable,
+        }),
+    };
+    thread::scope(|scope| {
+        for _ in 0..options.threads.get().min(jobs.len()) {
+            scope.spawn(|| {
+                while let Some(job) = jobs.get(shared.next.fetch_add(1, Ordering::Relaxed)) {
+                    let done =
+                        JobInProgress { runtime, place, options, job, open: None, closed: Vec::new() }.run();
+                    shared.take(job, done, progress);
+                }
+            });
+        }
+    });
+    let mut ingested = shared.ingested.into_inner().unwrap_or_else(PoisonError::into_inner);
+    ingested.warnings.sort();
+    ingested.failed.sort_by(|one, other| one.path.cmp(&other.path));
+    Ok(ingested)
+}
+
+/// What the threads share.
+struct Shared {
+    /// The next job.
+    next: AtomicUsize,
+    now: Mutex<Now>,
+    ingested: Mutex<Ingested>,
+}
+
+impl Shared {
+    fn take(&self, job: &Job, done: Result<Vec<Written>, JobError>, progress: &(dyn Fn(Now) + Sync)) {
+        {
+            let mut ingested = self.ingested.lock().unwrap_or_else(PoisonError::into_inner);
+            match done {
+                Ok(all) => all.into_iter().for_each(|written| ingested.add(written)),
+                Err(error) => ingested.failed.extend(job.failed(&error)),
+            }
+        }
+        let mut now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
+        now.files += job.sources.len();
+        now.bytes += job.sources.iter().map(|source| source.bytes).sum::<u64>();
+        progress(*now);
+    }
+}
+
+impl Ingested {
+    /// True if nothing is missing and nobody needs to be warned.
+    pub fn is_whole(&self) -> bool {
+        self.failed.is_empty() && self.warnings.is_empty()
+    }
+
+    fn add(&mut self, written: Written) {
+        match written {
+            Written::Kept => self.runs_kept += 1,
+            Written::New { rows, bytes, warnings } => {
+                self.runs_written += 1;
+                self.rows += rows;
+                self.bytes += bytes;
+                self.warnings.extend(warnings);
+            }
+        }
+    }
+}
+
+impl fmt::Display for Ingested {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { schema: _, to, runs_written, runs_kept, rows, bytes, warnings, failed } = self;
+        writeln!(
+            f,
+            "{} written ({}, {}), {} kept: {to}",
+            number_of(*runs_written, "run"),
+            number_of(*rows, "frame"),
+            in_mb(*bytes),
+            runs_kept
+        )?;
+        for warning in warnings {
+            writeln!(f, "warning: {warning}")?;
+        }
+        for FailedFile { path, problem } in failed {
+            writeln!(f, "not ingested: {}: {problem}", path.display())?;
+        }
+        Ok(())
+    }
+}
+
+/// A job with the files that it writes.
+struct JobInProgress<'a> {
+    runtime: &'a Handle,
+    place: &'a Place,
+    options: &'a Options,
+    job: &'a Job,
+    /// The file of the run whose rows come now.
+    open: Option<RunWriter>,
+    /// Files of recordings, which wait for the warnings that come last.
+    closed: Vec<RunWriter>,
+}
+
+impl JobInProgress<'_> {
+    fn run(mut self) -> Result<Vec<Written>, JobError> {
+        let mut written = Vec::new();
+        let (place, runtime) = (self.place, self.runtime);
+        if self.job.sources.iter().all(|source| source.is_kept(runtime, place, self.job)) {
+            return Ok(self.job.sources.iter().map(|_| Written::Kept).collect());
+        }
+        let paths: Vec<&Path> = self.job.sources.iter().map(|source| source.path.as_path()).collect();
+        let mut problem = None;
+        let source = rows::visit(&paths, |rig, row| {
+            if problem.is_none() {
+                problem = self.row(rig, row, &mut written).err();
+            }
+        })?;
+        if let Some(problem) = problem {
+            return Err(problem.into());
+        }
+        self.closed.extend(self.open.take());
+        if written.is_empty() && self.closed.is_empty() {
+            return Err(JobError::NoFrame);
+        }
+        for writer in self.closed {
+            let start = format!("run {}: ", writer.run());
+            let warnings =
+                source.warnings.iter().filter(|warning| warning.starts_with(&start)).cloned().collect();
+            written.push(writer.finish(runtime, place, warnings)?);
+        }
+        Ok(written)
+    }
+
+    fn row(&mut self, rig: &Rig, row: RowView<'_>, written: &mut Vec<Written>) -> Result<(), WriteError> {
+        if self.open.as_ref().is_none_or(|open| open.run() != row.run) {
+            if let Some(before) = self.open.take() {
+                if self.job.is_table() {
+                    // A table may have thousands of runs, and gives no warnings.
+                    written.push(before.finish(self.runtime, self.place, Vec::new())?);
+                } else {
+                    self.closed.push(before);
+                }
+            }
+            let head = self.job.head(rig, row.run, self.options.date)?;
+            self.open = Some(RunWriter::begin(self.runtime, self.place, head, rig)?);
+        }
+        match &mut self.open {
+            Some(open) => open.push(row),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Source {
+    /// True if the run of a recording is there already. Of a table nobody knows its runs before it is read.
+    fn is_kept(&self, runtime: &Handle, place: &Place, job: &Job) -> bool {
+        self.run.as_ref().is_some_and(|run| {
+            let head = job.recorded_head(self, run);
+            runtime.block_on(run_writer::is_there(place, &head))
+        })
+    }
+}

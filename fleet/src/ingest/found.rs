@@ -1,0 +1,214 @@
+//! The files to ingest, and which of them go together.
+
+use std::{
+    collections::BTreeMap,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use jiff::{Timestamp, civil::Date, tz::TimeZone};
+use tactus_record::{Entry, RecordError, RunMetadata};
+use tactus_schema::Rig;
+
+use super::{FailedFile, IngestError, JobError, run_writer::WriteError};
+use crate::{RunHead, run_head::SCHEMA};
+
+/// Files that are read together.
+#[derive(Debug)]
+pub(super) struct Job {
+    /// One table, or recordings: each goes on with the run of the one before.
+    pub(super) sources: Vec<Source>,
+}
+
+/// A file to ingest.
+#[derive(Debug)]
+pub(super) struct Source {
+    pub(super) path: PathBuf,
+    pub(super) bytes: u64,
+    /// The run of a recording; `None` of a table.
+    pub(super) run: Option<RunMetadata>,
+}
+
+/// The jobs, the largest first, so that no thread ends with a long one alone; and the files that are not readable.
+pub(super) fn found(paths: &[PathBuf]) -> Result<(Vec<Job>, Vec<FailedFile>), IngestError> {
+    let mut files = Vec::new();
+    for path in paths {
+        let kind = fs::metadata(path).map_err(|source| IngestError::Path { path: path.clone(), source })?;
+        if kind.is_dir() {
+            search(path, &mut files).map_err(|source| IngestError::Path { path: path.clone(), source })?;
+        } else {
+            files.push(path.clone());
+        }
+    }
+    files.sort();
+    files.dedup();
+    if files.is_empty() {
+        return Err(IngestError::Nothing { paths: paths.to_owned() });
+    }
+    let (mut sources, mut failed): (Vec<Source>, Vec<FailedFile>) = (Vec::new(), Vec::new());
+    for path in files {
+        match source(&path) {
+            Ok(source) => sources.push(source),
+            Err(error) => failed.push(FailedFile { path, problem: error.to_string() }),
+        }
+    }
+    let (mut jobs, doubles) = together(sources);
+    failed.extend(doubles);
+    jobs.sort_by_key(|job| std::cmp::Reverse(job.sources.iter().map(|source| source.bytes).sum::<u64>()));
+    Ok((jobs, failed))
+}
+
+/// Adds the recordings in a folder and in the folders in it.
+fn search(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let path = entry.path();
+        if entry.file_type()?.is_dir() {
+            search(&path, files)?;
+        } else if path.extension().is_some_and(|extension| extension == "mcap") {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+fn source(path: &Path) -> Result<Source, RecordError> {
+    let io_error = |source| RecordError::Io { action: "read", path: path.to_owned(), source };
+    let bytes = fs::metadata(path).map_err(io_error)?.len();
+    let entries = match tactus_record::read(path) {
+        Ok(entries) => entries,
+        // A table, or neither: whoever reads its rows says so.
+        Err(RecordError::NotMcap { .. }) => return Ok(Source { path: path.to_owned(), bytes, run: None }),
+        Err(error) => return Err(error),
+    };
+    for entry in entries {
+        match entry.map_err(io_error)? {
+            Entry::Run(run) => return Ok(Source { path: path.to_owned(), bytes, run: Some(run) }),
+            Entry::Attachment(_) => {}
+            Entry::Message { .. } => break,
+        }
+    }
+    Err(RecordError::NoRun { path: path.to_owned() })
+}
+
+/// Joins recordings that go on with each other. Of two recordings of one run the second is left out.
+fn together(sources: Vec<Source>) -> (Vec<Job>, Vec<FailedFile>) {
+    let mut jobs = Vec::new();
+    let mut failed = Vec::new();
+    let mut recordings: BTreeMap<String, Source> = BTreeMap::new();
+    for source in sources {
+        let Some(run) = &source.run else {
+            jobs.push(Job { sources: vec![source] });
+            continue;
+        };
+        if let Some(first) = recordings.get(&run.run_id) {
+            let problem =
+                format!("its run {:?} is also in {}, which was ingested", run.run_id, first.path.display());
+            failed.push(FailedFile { path: source.path, problem });
+        } else {
+            recordings.insert(run.run_id.clone(), source);
+        }
+    }
+    // From each run that goes on with none of these, along those that go on with it.
+    let goes_on = |source: &Source| source.run.as_ref().and_then(|run| run.continues.clone());
+    let mut later: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let mut firsts = Vec::new();
+    for (id, source) in &recordings {
+        match goes_on(source).filter(|earlier| earlier != id && recordings.contains_key(earlier)) {
+            Some(earlier) => later.entry(earlier).or_default().push(id.clone()),
+            None => firsts.push(id.clone()),
+        }
+    }
+    for first in firsts {
+        let mut order = vec![first];
+        let mut at = 0;
+        while let Some(id) = order.get(at) {
+            let next = later.remove(id).unwrap_or_default();
+            order.extend(next);
+            at += 1;
+        }
+        let sources: Vec<Source> = order.iter().filter_map(|id| recordings.remove(id)).collect();
+        jobs.push(Job { sources });
+    }
+    // What is left goes on with each other in a circle, which no service writes.
+    jobs.extend(recordings.into_values().map(|source| Job { sources: vec![source] }));
+    (jobs, failed)
+}
+
+impl Job {
+    /// True if its rows come from a measurement table.
+    pub(super) fn is_table(&self) -> bool {
+        self.sources.iter().all(|source| source.run.is_none())
+    }
+
+    /// The head of a run whose first row has come.
+    pub(super) fn head(&self, rig: &Rig, run: &str, date: Option<Date>) -> Result<RunHead, WriteError> {
+        let recorded = self.sources.iter().find_map(|source| {
+            let metadata = source.run.as_ref().filter(|metadata| metadata.run_id == run)?;
+            Some(self.recorded_head(source, metadata))
+        });
+        if let Some(head) = recorded {
+            return Ok(head);
+        }
+        let date = date_of_id(run).or(date).ok_or_else(|| WriteError::NoDate { run: run.to_owned() })?;
+        Ok(RunHead {
+            schema: SCHEMA.to_owned(),
+            run: run.to_owned(),
+            rig: rig.name.clone(),
+            date: date.to_string(),
+            started_ns: None,
+            simulated: rig.simulated,
+            experiment: None,
+            script: None,
+            who: None,
+            continues: None,
+            continued_by: None,
+            source_bytes: self.sources.iter().map(|source| source.bytes).sum(),
+            warnings: Vec::new(),
+        })
+    }
+
+    /// The head of a recorded run.
+    pub(super) fn recorded_head(&self, source: &Source, run: &RunMetadata) -> RunHead {
+        let goes_on_with = |other: &&RunMetadata| other.continues.as_ref() == Some(&run.run_id);
+        RunHead {
+            schema: SCHEMA.to_owned(),
+            run: run.run_id.clone(),
+            rig: run.rig.clone(),
+            date: day(run.started.ns()).to_string(),
+            started_ns: Some(run.started.ns()),
+            simulated: run.simulated,
+            experiment: Some(run.experiment.clone()),
+            script: Some(run.script.clone()),
+            who: Some(run.who.clone()),
+            continues: run.continues.clone(),
+            continued_by: self
+                .sources
+                .iter()
+                .filter_map(|source| source.run.as_ref())
+                .find(goes_on_with)
+                .map(|other| other.run_id.clone()),
+            source_bytes: source.bytes,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Its files, for a problem that one of them has.
+    pub(super) fn failed(&self, error: &JobError) -> Vec<FailedFile> {
+        let failed = |source: &Source| FailedFile { path: source.path.clone(), problem: error.to_string() };
+        self.sources.iter().map(failed).collect()
+    }
+}
+
+/// The day of a time, UTC.
+fn day(wall_ns: i64) -> Date {
+    Timestamp::from_second(wall_ns.div_euclid(1_000_000_000))
+        .map_or(Date::constant(1970, 1, 1), |at| at.to_zoned(TimeZone::UTC).date())
+}
+
+/// The date with which the ids of runs begin: `20260325-100000-image-5e1f`.
+fn date_of_id(run: &str) -> Option<Date> {
+    let digits = run.get(..8).filter(|start| start.bytes().all(|byte| byte.is_ascii_digit()))?;
+    let (year, month, day) = (digits.get(..4)?, digits.get(4..6)?, digits.get(6..8)?);
+    Date::new(year.parse().ok()?, month.parse().ok()?, day.parse().ok()?).ok()
+}

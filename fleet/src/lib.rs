@@ -1,0 +1,28 @@
+//! Many recordings in one place.
+//!
+//! [`ingest`](ingest()) writes recordings and measurement tables as Parquet, one file per run, at `rig=NAME/date=YYYY-MM-DD/RUN.parquet` on a
+//! local disk or in any object store: a fleet. Each file is a measurement table, too, so that every other command of Tactus reads it, and
+//! every program that reads Parquet by folders.
+//!
+//! | module | does |
+//! |---|---|
+//! | `place` | where a fleet is: a folder or an address, and its object store |
+//! | `columns` | the columns of a file, and rows as Arrow batches |
+//! | `run_head` | what a file says of its run, in its metadata |
+//! | `ingest` | from recordings to files |
+#![expect(clippy::print_stderr, reason = "errors go to standard error, results to standard output")]
+
+mod cli;
+mod columns;
+mod exit;
+mod ingest;
+mod output;
+mod place;
+mod progress;
+mod run_head;
+
+pub use cli::main;
+pub use ingest::{FailedFile, IngestError, Ingested, Options as IngestOptions, ingest};
+pub use place::{Place, PlaceError};
+pub use progress::Now;
+pub use run_head::RunHead;

@@ -1,0 +1,106 @@
+//! What a file says of its run, in its metadata.
+
+use object_store::{ObjectMeta, ObjectStoreExt as _};
+use parquet::{
+    errors::ParquetError,
+    file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader},
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{Place, PlaceError};
+
+/// Key of the file metadata that holds the head as JSON.
+const METADATA_KEY: &str = "tactus.run";
+
+/// Form of the head.
+pub(crate) const SCHEMA: &str = "tactus.fleet.run/1";
+
+/// Bytes at the end of a file that are read first: they hold the metadata of most.
+const FOOTER_BYTES: u64 = 64 * 1024;
+
+/// What a file says of its run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunHead {
+    /// Form of this head.
+    pub schema: String,
+    /// Id of the run.
+    pub run: String,
+    /// Name of the rig.
+    pub rig: String,
+    /// Day of its start, UTC, as `YYYY-MM-DD`.
+    pub date: String,
+    /// When it began, nanoseconds since 1970, UTC; none of runs in tables.
+    pub started_ns: Option<i64>,
+    /// True if no physical sensor was read.
+    pub simulated: bool,
+    /// Name of the experiment; none of runs in tables, as the next two.
+    pub experiment: Option<String>,
+    /// File name of the experiment's script.
+    pub script: Option<String>,
+    /// Who started the run.
+    pub who: Option<String>,
+    /// Id of the earlier run that it goes on with, if it does.
+    pub continues: Option<String>,
+    /// Id of the run that goes on with it, whose presses are left out here.
+    pub continued_by: Option<String>,
+    /// Size of the file that the rows come from. A file of another size is read anew.
+    pub source_bytes: u64,
+    /// What readers of the rows must know, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Why a file is not that of a run.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum HeadError {
+    #[error(transparent)]
+    Place(#[from] PlaceError),
+    #[error("{path}: {problem}: delete it, and ingest its run again")]
+    NotOfRun { path: String, problem: String },
+}
+
+impl RunHead {
+    /// The pair of a file's metadata.
+    pub(crate) fn to_metadata(&self) -> serde_json::Result<KeyValue> {
+        Ok(KeyValue::new(METADATA_KEY.to_owned(), serde_json::to_string(self)?))
+    }
+
+    /// What a file says; its rows are not read.
+    pub(crate) async fn read(place: &Place, file: &ObjectMeta) -> Result<Self, HeadError> {
+        let path = file.location.to_string();
+        let not_of_run = |problem: String| HeadError::NotOfRun { path: path.clone(), problem };
+        let metadata = metadata(place, file).await?;
+        let mut pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
+        let head = pairs.find(|pair| pair.key == METADATA_KEY).and_then(|pair| pair.value.as_deref());
+        let head = head.ok_or_else(|| not_of_run(format!("its metadata lack {METADATA_KEY:?}")))?;
+        serde_json::from_str(head).map_err(|error| not_of_run(format!("{METADATA_KEY}: {error}")))
+    }
+
+    /// True if a file with this head need not be written again in place of `known`.
+    pub(crate) fn is_same_source(&self, known: &Self) -> bool {
+        self.schema == known.schema
+            && self.source_bytes == known.source_bytes
+            && self.continued_by == known.continued_by
+    }
+}
+
+async fn metadata(place: &Place, file: &ObjectMeta) -> Result<ParquetMetaData, HeadError> {
+    let mut wanted = FOOTER_BYTES.min(file.size);
+    loop {
+        let end = place.store().get_range(&file.location, file.size - wanted..file.size);
+        let end = end.await.map_err(|source| place.refused(source))?;
+        let mut reader = ParquetMetaDataReader::new();
+        match reader.try_parse_sized(&end, file.size) {
+            Ok(()) => {}
+            Err(ParquetError::NeedMoreData(more)) if wanted < file.size => {
+                wanted = u64::try_from(more).unwrap_or(u64::MAX).max(wanted + 1).min(file.size);
+                continue;
+            }
+            Err(error) => return Err(not_parquet(file, &error)),
+        }
+        return reader.finish().map_err(|error| not_parquet(file, &error));
+    }
+}
+
+fn not_parquet(file: &ObjectMeta, error: &ParquetError) -> HeadError {
+    HeadError::NotOfRun { path: file.location.to_string(), problem: error.to_string() }
+}

@@ -1,0 +1,154 @@
+//! From recordings to one file per run: where it lies, what it says, what a kill leaves.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use std::{fs, num::NonZeroUsize, sync::Arc, thread};
+
+use object_store::{ObjectStoreExt as _, memory::InMemory};
+use tactus_fleet::{IngestOptions, Place, ingest};
+use tactus_record::table;
+use url::Url;
+
+use crate::lab::{Lab, NOON_NS};
+
+#[test]
+fn each_run_is_a_file_by_rig_and_date_and_a_measurement_table() {
+    let lab = Lab::with_three_runs();
+    let told = lab.ingest();
+    assert_eq!((&told["schema"], &told["runs_written"]), (&"tactus.fleet.ingest/1".into(), &3.into()));
+    assert_eq!(
+        lab.files(),
+        [
+            "rig=left/date=2026-03-25/20260325-120000-image.parquet",
+            "rig=right/date=2026-03-25/20260325-120000-centres.parquet",
+            "rig=right/date=2026-03-26/20260326-120000-centres.parquet",
+        ]
+    );
+    let mut rows = 0;
+    for file in lab.files() {
+        let table = table::read(lab.path("fleet").join(&file)).unwrap();
+        assert!(file.contains(&format!("rig={}/", table.head().rig.name)), "{file}");
+        rows += table.len() as u64;
+    }
+    assert_eq!(told["rows"], rows);
+    // The rows are those of the recording.
+    let recording = lab.path("runs/20260325-120000-image/recording.mcap");
+    tactus_record::export(&[recording], lab.path("table.parquet")).unwrap();
+    let exported = table::read(lab.path("table.parquet")).unwrap();
+    let ingested = table::read(lab.path("fleet").join(&lab.files()[0])).unwrap();
+    assert!(exported.rows().eq(ingested.rows()));
+}
+
+#[test]
+fn a_run_that_is_there_is_kept_and_a_recording_of_another_size_is_read_anew() {
+    let lab = Lab::with_three_runs();
+    lab.ingest();
+    let before = lab.files().iter().map(|file| modified(&lab, file)).collect::<Vec<_>>();
+    let told = lab.ingest();
+    assert_eq!((&told["runs_written"], &told["runs_kept"]), (&0.into(), &3.into()));
+    assert_eq!(before, lab.files().iter().map(|file| modified(&lab, file)).collect::<Vec<_>>());
+
+    fs::remove_dir_all(lab.path("runs/20260325-120000-image")).unwrap();
+    lab.record("left", "20260325-120000-image", NOON_NS, 3);
+    let told = lab.ingest();
+    assert_eq!((&told["runs_written"], &told["runs_kept"]), (&1.into(), &2.into()));
+    let table = table::read(lab.path("fleet").join(&lab.files()[0])).unwrap();
+    assert_eq!(table.rows().map(|row| row.press).max(), Some(2));
+}
+
+fn modified(lab: &Lab, file: &str) -> std::time::SystemTime {
+    fs::metadata(lab.path("fleet").join(file)).unwrap().modified().unwrap()
+}
+
+#[test]
+fn a_file_that_is_no_longer_readable_is_written_again() {
+    let lab = Lab::with_three_runs();
+    lab.ingest();
+    let file = lab.path("fleet").join(&lab.files()[1]);
+    let whole = fs::read(&file).unwrap();
+    fs::write(&file, &whole[..whole.len() / 2]).unwrap();
+    assert_eq!(lab.ingest()["runs_written"], 1);
+    assert_eq!(fs::read(&file).unwrap(), whole);
+}
+
+#[test]
+fn a_killed_ingest_leaves_whole_files_only_and_the_next_goes_on() {
+    let lab = Lab::new();
+    for run in 0..24 {
+        lab.record("left", &format!("20260325-1200{run:02}-image"), NOON_NS, 4);
+    }
+    let mut child = lab.command(&["--threads", "1", "ingest", "runs", "--to", "fleet"]).spawn().unwrap();
+    while lab.files().is_empty() && child.try_wait().unwrap().is_none() {
+        thread::yield_now();
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let whole = lab.files().into_iter().filter(|file| file.ends_with(".parquet")).collect::<Vec<_>>();
+    for file in &whole {
+        table::validate(lab.path("fleet").join(file)).unwrap();
+    }
+    let told = lab.ingest();
+    assert_eq!(told["runs_kept"].as_u64(), Some(whole.len() as u64));
+    let files = lab.files().into_iter().filter(|file| file.ends_with(".parquet"));
+    assert_eq!(files.count(), 24);
+}
+
+#[test]
+fn files_that_cannot_be_ingested_stop_no_other() {
+    let lab = Lab::with_three_runs();
+    let recording = lab.path("runs/20260325-120000-image/recording.mcap");
+    fs::copy(&recording, lab.path("runs/copy.mcap")).unwrap();
+    fs::write(lab.path("runs/other.mcap"), b"no recording").unwrap();
+    let said = lab.fleet(&["--json", "ingest", "runs", "--to", "fleet"]);
+    assert_eq!(said.code, Some(3), "{said:?}");
+    let told = said.json();
+    assert_eq!(told["runs_written"], 3);
+    let failed = told["failed"].as_array().unwrap();
+    assert_eq!(failed.len(), 2, "{told}");
+    assert!(failed[0]["problem"].as_str().unwrap().contains("which was ingested"), "{told}");
+    assert!(failed[1]["problem"].as_str().unwrap().contains("neither a recording"), "{told}");
+
+    let said = lab.fleet(&["ingest", "nowhere", "--to", "fleet"]);
+    assert_eq!(said.code, Some(1));
+    assert!(said.err.contains("nowhere"), "{said:?}");
+}
+
+#[test]
+fn a_table_is_ingested_run_by_run_and_needs_a_date_if_its_runs_have_none() {
+    let lab = Lab::with_three_runs();
+    let recordings = ["20260325-120000-centres", "20260326-120000-centres"]
+        .map(|run| lab.path(&format!("runs/{run}/recording.mcap")));
+    tactus_record::export(&recordings, lab.path("table.parquet")).unwrap();
+    let said = lab.fleet(&["--json", "ingest", "table.parquet", "--to", "fleet"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert_eq!(said.json()["runs_written"], 2);
+    assert_eq!(lab.files().len(), 2);
+
+    let undated = lab.record("left", "image of monday", NOON_NS, 1);
+    tactus_record::export(&[undated], lab.path("undated.parquet")).unwrap();
+    let said = lab.fleet(&["ingest", "undated.parquet", "--to", "fleet"]);
+    assert_eq!(said.code, Some(3), "{said:?}");
+    assert!(said.out.contains("Give one with --date"), "{said:?}");
+    let said = lab.fleet(&["ingest", "undated.parquet", "--to", "fleet", "--date", "2026-03-30"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(
+        lab.files().contains(&"rig=left/date=2026-03-30/image of monday.parquet".to_owned()),
+        "{:?}",
+        lab.files()
+    );
+}
+
+#[test]
+fn any_object_store_holds_a_fleet() {
+    let lab = Lab::with_three_runs();
+    let runtime = tokio::runtime::Runtime::new().unwrap();
+    let store = Arc::new(InMemory::new());
+    let place = Place::of(store.clone(), Url::parse("memory:///labs/fleet").unwrap()).unwrap();
+    let options = IngestOptions { threads: NonZeroUsize::MIN, date: None };
+    let told = ingest(runtime.handle(), &[lab.path("runs")], &place, &options, &|_| ()).unwrap();
+    assert_eq!((told.runs_written, told.failed.len()), (3, 0));
+    let path = "labs/fleet/rig=left/date=2026-03-25/20260325-120000-image.parquet";
+    runtime.block_on(store.head(&path.into())).unwrap();
+    assert_eq!(runtime.block_on(place.files()).unwrap().len(), 3);
+    let told = ingest(runtime.handle(), &[lab.path("runs")], &place, &options, &|_| ()).unwrap();
+    assert_eq!((told.runs_written, told.runs_kept), (0, 3));
+}
