@@ -1,5 +1,6 @@
 //! The commands and their arguments.
 
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -111,6 +112,13 @@ enum CliCommand {
     Discover(DiscoverArgs),
     /// List the effects of the library and the lab's own; show, add, rename and retire those of the lab.
     Effects(EffectsArgs),
+    /// Take many recordings together. This is the program `tactus-fleet`, which is built by itself.
+    #[command(disable_help_flag = true)]
+    Fleet {
+        /// A command of it with its arguments; `tactus fleet --help` lists them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        args: Vec<OsString>,
+    },
     /// Repeat the paper on one rig: runs, calibration, mechanics, acuity and images in one report.
     Study(StudyArgs),
     /// Simulate what a sensor reads from a tool: one image, frames along a path, or live frames on the bus.
@@ -828,6 +836,7 @@ fn dispatch(common: &Common, command: CliCommand) -> anyhow::Result<Exit> {
         CliCommand::Report(args) => commands::files::report(common, &args),
         CliCommand::Calibrate(args) => commands::calibrate::calibrate(common, &args),
         CliCommand::Discover(args) => commands::discover::discover(common, &args),
+        CliCommand::Fleet { args } => commands::fleet::fleet(common, &args),
         CliCommand::Study(args) => commands::study::study(common, &args),
         CliCommand::Simulate(args) => commands::simulate::simulate(common, &args),
         CliCommand::Effects(args) => commands::effects::effects(common, &args),

@@ -10,6 +10,7 @@ pub(crate) mod effects;
 pub(crate) mod experiments;
 pub(crate) mod figures;
 pub(crate) mod files;
+pub(crate) mod fleet;
 pub(crate) mod import;
 pub(crate) mod library;
 pub(crate) mod link;

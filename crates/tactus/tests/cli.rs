@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -31,6 +32,7 @@ fn the_help_names_every_command() {
         "recover",
         "report",
         "discover",
+        "fleet",
         "stage",
         "validate",
         "completions",
@@ -107,4 +109,25 @@ fn a_stage_check_on_the_embedded_rig_needs_nothing() {
     assert_eq!(checked.status.code(), Some(0), "{said}");
     let header = "axis  asked mm  reported mm  error um  took ms  verdict";
     assert!(said.lines().any(|line| line == header), "{said}");
+}
+
+#[test]
+fn fleet_hands_over_to_its_program_or_says_how_to_build_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let fleet = |path: &Path, args: &[&str]| {
+        let mut tactus = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        tactus.env("PATH", path).args(args).output().unwrap()
+    };
+    let said = fleet(folder.path(), &["fleet", "query", "SELECT 1"]);
+    assert_eq!(said.status.code(), Some(1));
+    let error = String::from_utf8(said.stderr).unwrap();
+    assert!(error.contains("cargo build --release --manifest-path fleet/Cargo.toml"), "{error}");
+
+    let program = folder.path().join("tactus-fleet");
+    fs::write(&program, "#!/bin/sh\nprintf '%s\\n' \"$@\"\nexit 3\n").unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    let args = ["--json", "fleet", "query", "SELECT 1", "--at", "fleet", "--help"];
+    let said = fleet(folder.path(), &args);
+    assert_eq!(said.status.code(), Some(3), "{said:?}");
+    assert_eq!(String::from_utf8(said.stdout).unwrap(), "--json\nquery\nSELECT 1\n--at\nfleet\n--help\n");
 }
