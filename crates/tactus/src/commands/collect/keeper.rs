@@ -176,6 +176,12 @@ fn described(name: &str, reply: pb::CommandReply) -> anyhow::Result<Described> {
         anyhow::anyhow!("its service does not describe it as a recording needs it: {error}")
     })?;
     anyhow::ensure!(rig.name == name, "its service describes another rig, {:?}", rig.name);
+    // Only the name of a rig in service is sure to be the name of a folder, too.
+    anyhow::ensure!(rig.service.is_some(), "its service describes a rig without sensor and stage");
     let simulated = rig.simulated || reply.health.is_some_and(|health| health.simulated);
     Ok(Described { rig, rig_toml: reply.rig_toml, simulated, version: reply.version })
 }
+
+#[cfg(test)]
+#[path = "keeper_tests.rs"]
+mod tests;
