@@ -266,6 +266,48 @@ fn what_is_no_longer_kept_after_a_cut_is_counted_told_and_recorded() {
     assert_eq!((missing(&seqs), totals["frames_lost"].as_u64()), (lost, Some(lost)), "{totals}");
 }
 
+#[test]
+fn a_service_that_starts_again_gets_a_new_file_from_its_first_frame_on() {
+    let runtime = Runtime::new().unwrap();
+    let (_router, router) = router(&runtime);
+    let folder = TempDir::new().unwrap();
+    let host = Host::new("left", &router, 1_800);
+    let daemon = host.serve();
+    let mut collector = collect(folder.path(), &router, &[]);
+    collector.wait_for("left: found");
+    wait_until_collected(folder.path(), "left", host.wait_for_frames(5));
+    daemon.signal(Signal::TERM);
+    let (code, said) = daemon.wait();
+    assert_eq!(code, Some(0), "{said}");
+    collector.wait_for("left: gone");
+
+    let _daemon = host.serve();
+    collector.wait_for("started again");
+    wait_until_collected(folder.path(), "left", host.wait_for_frames(30));
+    let (code, totals) = ended(collector, "left");
+    let files = recordings(&folder.path().join("collected/left"));
+    assert_eq!((code, files.len(), &totals["frames_lost"]), (Some(0), 2, &0.into()), "{totals}");
+    let (seqs, lost) = recorded(&files[1..]);
+    assert_eq!((seqs[0], missing(&seqs), lost), (0, 0, 0), "{seqs:?}");
+}
+
+#[test]
+fn two_rigs_of_one_name_are_named_and_neither_is_recorded() {
+    let runtime = Runtime::new().unwrap();
+    let (_router, router) = router(&runtime);
+    let folder = TempDir::new().unwrap();
+    let hosts = ["here", "there"].map(|_| Host::new("twin", &router, 1_800));
+    let _daemons = hosts.each_ref().map(Host::serve);
+    // Both have joined the router once it refuses the name.
+    let status = ["--endpoint", &router, "--rig", "twin", "status"];
+    while !tactus(folder.path(), &status).err.contains("several programs") {}
+    let mut collector = collect(folder.path(), &router, &[]);
+    collector.wait_for("several programs");
+    let (code, totals) = ended(collector, "twin");
+    assert_eq!((code, &totals["frames"]), (Some(3), &0.into()), "{totals}");
+    assert!(totals["problem"].as_str().unwrap().contains("name of its own"), "{totals}");
+}
+
 /// Two hosts with a cable between them: network namespaces, which nothing else reaches.
 struct Cable {
     near: String,

@@ -5,9 +5,12 @@ use std::time::Duration;
 
 use crate::lab::{Link, Service, connected, frame, open, open_with, router, router_at};
 use tactus_bus::{
-    BusConfig, BusError, Client, Credentials, Endpoint, History, Lab, Losses, Subscription, ask_all,
+    Bus, BusConfig, BusError, Client, Credentials, Endpoint, History, Lab, Losses, Subscription, ask_all,
 };
-use tactus_schema::{key::Command, pb};
+use tactus_schema::{
+    key::{Command, Keys},
+    pb,
+};
 
 /// Longer than any test runs.
 const PATIENCE: Duration = Duration::from_hours(1);
@@ -142,4 +145,13 @@ async fn two_hosts_with_a_rig_of_one_name_are_refused_by_name() {
         lab.changed().await.unwrap();
     }
     second.bus.close().await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_number_of_frames_that_cannot_be_kept_is_refused() {
+    for frames in [0, 16_001] {
+        let config = BusConfig { listen: vec![], frames_kept: Some(frames), ..BusConfig::default() };
+        let error = Bus::open(&config, Keys::new("bench")).await.unwrap_err();
+        assert!(error.to_string().contains(&format!("frames_kept = {frames}: 1 to 16000")), "{error}");
+    }
 }

@@ -20,7 +20,7 @@ use serde_json::json;
 use tactus_bus::{BusError, Lab};
 use tactus_runner::signals::EndingSignals;
 use tokio::sync::watch;
-use tokio::task::JoinSet;
+use tokio::task::{JoinError, JoinSet};
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
 use crate::cli::{CollectArgs, Common};
@@ -68,12 +68,15 @@ pub(crate) fn collect(common: &Common, args: &CollectArgs) -> anyhow::Result<Exi
     Ok(report(common, args, &collected, &problems))
 }
 
+/// How a keeper ended.
+type Kept = Result<Result<(), BusError>, JoinError>;
+
 /// The rigs that are being recorded.
 struct Collection {
     lab: Lab,
     archive: Archive,
     ending: watch::Receiver<bool>,
-    keepers: JoinSet<(String, Result<(), BusError>)>,
+    keepers: JoinSet<(String, Kept)>,
     /// Rigs that are there now.
     there: BTreeSet<String>,
     /// What is wrong with each rig that was found, if anything is.
@@ -95,7 +98,7 @@ impl Collection {
                     Some(()) => self.look(named).await,
                     None => return,
                 },
-                Some(kept) = self.keepers.join_next() => self.note(kept),
+                Some(Ok((rig, kept))) = self.keepers.join_next() => self.note(rig, kept),
             }
         }
     }
@@ -119,7 +122,7 @@ impl Collection {
             if let Some(client) = client.filter(|_| !self.archive.has(rig)) {
                 let keeper = Keeper::new(client, self.archive.add(rig), self.ending.clone());
                 let name = rig.clone();
-                self.keepers.spawn(async move { (name, keeper.keep().await) });
+                self.keepers.spawn(async move { (name, tokio::spawn(keeper.keep()).await) });
             }
             let before = self.known.insert(rig.clone(), problem.clone()).flatten();
             if let Some(problem) = problem.filter(|problem| before.as_ref() != Some(problem)) {
@@ -129,21 +132,20 @@ impl Collection {
         self.there = there;
     }
 
-    fn note(&mut self, kept: Result<(String, Result<(), BusError>), tokio::task::JoinError>) {
-        match kept {
-            Ok((_, Ok(()))) => {}
-            Ok((rig, Err(error))) => {
-                eprintln!("{rig}: {error}");
-                self.known.insert(rig, Some(error.to_string()));
-            }
-            Err(panic) => eprintln!("a rig is no longer recorded: {panic}; this is a defect of Tactus"),
-        }
+    fn note(&mut self, rig: String, kept: Kept) {
+        let problem = match kept {
+            Ok(Ok(())) => return,
+            Ok(Err(error)) => error.to_string(),
+            Err(panic) => format!("it is no longer recorded: {panic}; this is a defect of Tactus"),
+        };
+        eprintln!("{rig}: {problem}");
+        self.known.insert(rig, Some(problem));
     }
 
     /// Closes all files.
     async fn finish(mut self, named: &BTreeSet<String>) -> anyhow::Result<(Collected, Problems)> {
-        while let Some(kept) = self.keepers.join_next().await {
-            self.note(kept);
+        while let Some(Ok((rig, kept))) = self.keepers.join_next().await {
+            self.note(rig, kept);
         }
         let Self { lab, archive, known, .. } = self;
         let missing = named.iter().filter(|rig| !archive.has(rig) && !known.contains_key(*rig));
