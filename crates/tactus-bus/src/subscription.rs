@@ -35,6 +35,9 @@ const HISTORY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Bytes that wait for the reader at most.
 const ARRIVED_BYTES_MAX: usize = 64 << 20;
 
+/// Publishers whose last message is remembered.
+const PUBLISHERS_MAX: usize = 16;
+
 /// Messages from before the subscription that a subscriber gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum History {
@@ -73,8 +76,9 @@ pub struct Gap {
 pub struct Subscription<M> {
     reception: Arc<Reception>,
     trust: Trust,
-    /// The last message of each publisher that was given out.
+    /// The last message that was given out of each of the latest publishers.
     last: HashMap<EntityGlobalId, u32>,
+    publishers: usize,
     /// What is missing just before it.
     gap: Option<Gap>,
     /// Taken, while nobody speaks for the rig yet.
@@ -158,6 +162,7 @@ impl<M: Published> Subscription<M> {
             reception,
             trust,
             last: HashMap::new(),
+            publishers: 0,
             gap: None,
             undecided: None,
             unreadable: 0,
@@ -213,19 +218,22 @@ impl<M: Published> Subscription<M> {
 
     /// Publishers of the messages so far: a rig that starts again, alone or with its service, has another one.
     pub fn publishers(&self) -> usize {
-        self.last.len()
+        self.publishers
     }
 
     /// Compares the message's number with the last one of its publisher.
     fn count(&mut self, sample: &Sample) {
         self.gap = None;
         let Some((publisher, number)) = numbered(sample.clone()).origin else { return };
-        // What the first publisher sent before is history; of a later one, everything is due.
-        let is_first = self.last.is_empty();
-        let due = match self.last.insert(publisher, number) {
-            Some(last) => last.wrapping_add(1),
-            None if is_first => number,
-            None => 0,
+        let due = if let Some(last) = self.last.insert(publisher, number) {
+            last.wrapping_add(1)
+        } else {
+            self.publishers += 1;
+            if self.last.len() > PUBLISHERS_MAX {
+                self.last.retain(|by, _| *by == publisher);
+            }
+            // What the first publisher sent before is history; of a later one, everything is due.
+            if self.publishers == 1 { number } else { 0 }
         };
         if due < number {
             self.gap = Some(Gap { publisher, numbers: due..=number - 1 });

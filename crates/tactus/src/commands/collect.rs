@@ -26,7 +26,7 @@ use tokio::time::{MissedTickBehavior, interval, sleep};
 use crate::cli::{CollectArgs, Common};
 use crate::connection;
 use crate::exit::{Exit, Failure};
-use crate::output::{print_table, say};
+use crate::output::{print_table, say, say_next};
 use archive::{Archive, Collected, Limits};
 use keeper::Keeper;
 
@@ -201,6 +201,6 @@ fn report(common: &Common, args: &CollectArgs, collected: &Collected, problems: 
         })
         .collect();
     print_table(&["RIG", "FILES", "FRAMES", "LOST", "OTHERS LOST", "WHAT"], &rows);
-    say(&format!("recordings in {}", args.out.display()));
+    say_next(&format!("`tactus record info {}/*/*.mcap`", args.out.display()));
     exit
 }
