@@ -1,17 +1,27 @@
 //! The commands and their arguments.
 
-use std::{num::NonZeroUsize, path::PathBuf, process::ExitCode, thread};
+use std::{
+    fs,
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    thread,
+};
 
 use anyhow::Context as _;
 use clap::{Args, Parser, Subcommand};
 use jiff::civil::Date;
+use serde::Serialize;
+use tactus_report::fleet::{FleetReport, Trend, fleet_html};
 use tokio::runtime::Runtime;
 
 use crate::{
     IngestOptions, Place,
     exit::{Exit, in_words},
-    ingest, output,
+    ingest,
+    output::{self, number_of},
     progress::Progress,
+    survey::{Analysis, Calibrated, Discovered, Surveyed, findings, results, survey},
 };
 
 /// Many recordings in one place: Parquet by rig and date.
@@ -45,6 +55,10 @@ impl Common {
 enum FleetCommand {
     /// Write recordings and measurement tables into a fleet: one Parquet file per run. Runs that are there already are kept.
     Ingest(IngestArgs),
+    /// Calibrate each run by itself; report which sensors drift and which coverings age. Runs that were calibrated before are kept.
+    Calibrate(SurveyArgs),
+    /// Search each run for effects that its rig's model lacks; report which rigs share one. Runs that were searched before are kept.
+    Discover(SurveyArgs),
 }
 
 #[derive(Debug, Args)]
@@ -58,6 +72,16 @@ struct IngestArgs {
     /// Date of runs whose file does not say when they were made: those of tables, unless their id begins with a date.
     #[arg(long, value_name = "YYYY-MM-DD")]
     date: Option<Date>,
+}
+
+#[derive(Debug, Args)]
+struct SurveyArgs {
+    /// The fleet: a folder, or an address such as `s3://bucket/fleet`.
+    #[arg(long, value_name = "DIR_OR_URL", default_value = "fleet", env = "TACTUS_FLEET")]
+    at: String,
+    /// Folder for the result of each run, and for report.html and report.json, which calibrations and discoveries share.
+    #[arg(long, value_name = "DIR", default_value = "survey")]
+    out: PathBuf,
 }
 
 /// Runs the program with the process's arguments.
@@ -82,6 +106,8 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
         .context("threads cannot be started")?;
     match &cli.command {
         FleetCommand::Ingest(args) => run_ingest(&runtime, &cli.common, args),
+        FleetCommand::Calibrate(args) => run_survey::<Calibrated>(&runtime, &cli.common, args),
+        FleetCommand::Discover(args) => run_survey::<Discovered>(&runtime, &cli.common, args),
     }
 }
 
@@ -97,4 +123,68 @@ fn run_ingest(runtime: &Runtime, common: &Common, args: &IngestArgs) -> anyhow::
         output::write(&ingested.to_string())?;
     }
     Ok(if ingested.is_whole() { Exit::Done } else { Exit::Degraded })
+}
+
+fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs) -> anyhow::Result<Exit> {
+    let (place, runtime) = (Place::at(&args.at)?, runtime.handle());
+    let progress = Progress::new(common.json);
+    let surveyed = survey::<T>(runtime, &place, &args.out, common.threads(), &|now| progress.show(now))?;
+    progress.clear();
+    let calibrated = results::<Calibrated>(runtime, &place, &args.out)?;
+    let discovered = results::<Discovered>(runtime, &place, &args.out)?;
+    let report = findings(place.url().as_str(), &calibrated, &discovered);
+    let json =
+        serde_json::to_string_pretty(&SurveyJson { schema: SURVEY_SCHEMA, surveyed, report: &report })?;
+    let page = args.out.join("report.html");
+    for (path, text) in [(&page, &fleet_html(&report)), (&args.out.join("report.json"), &json)] {
+        fs::write(path, text).with_context(|| path.display().to_string())?;
+    }
+    if common.json {
+        output::write(&format!("{json}\n"))?;
+    } else {
+        output::write(&in_short(&surveyed, &report, &page))?;
+    }
+    Ok(if report.refused.is_empty() { Exit::Done } else { Exit::Degraded })
+}
+
+/// `report.json`, and what `--json` prints.
+#[derive(Serialize)]
+struct SurveyJson<'a> {
+    schema: &'static str,
+    #[serde(flatten)]
+    surveyed: Surveyed,
+    #[serde(flatten)]
+    report: &'a FleetReport,
+}
+
+const SURVEY_SCHEMA: &str = "tactus.fleet.survey/1";
+
+/// What a survey found, in a few lines.
+fn in_short(surveyed: &Surveyed, report: &FleetReport, page: &Path) -> String {
+    let changing = |trends: &[Trend]| trends.iter().filter(|trend| trend.changes).count();
+    let shared = report.effects.iter().filter(|effect| effect.shared).map(|effect| effect.effect.as_str());
+    let shared: Vec<&str> = shared.collect();
+    let simulated = if report.simulated { " (SIMULATED)" } else { "" };
+    let refused = match report.refused.as_slice() {
+        [] => String::new(),
+        refused => {
+            format!("not judged   {}, the first: {}\n", number_of(refused.len() as u64, "run"), refused[0])
+        }
+    };
+    format!(
+        "runs         {} analysed, {} kept, of {}{simulated}\n\
+         drifts       {} of {}\n\
+         coverings    {} of {} age\n\
+         shared       {}\n\
+         {refused}report       {}\n",
+        surveyed.runs_analysed,
+        surveyed.runs_kept,
+        number_of(report.rigs, "rig"),
+        changing(&report.drifts),
+        report.drifts.len(),
+        changing(&report.ageing),
+        report.ageing.len(),
+        if shared.is_empty() { "no effect".to_owned() } else { shared.join(", ") },
+        page.display()
+    )
 }

@@ -10,6 +10,7 @@
 //! | `columns` | the columns of a file, and rows as Arrow batches |
 //! | `run_head` | what a file says of its run, in its metadata |
 //! | `ingest` | from recordings to files |
+//! | `survey` | calibration and discovery of every run, and what they say together |
 #![expect(clippy::print_stderr, reason = "errors go to standard error, results to standard output")]
 
 mod cli;
@@ -20,6 +21,7 @@ mod output;
 mod place;
 mod progress;
 mod run_head;
+mod survey;
 
 pub use cli::main;
 pub use ingest::{FailedFile, IngestError, Ingested, Options as IngestOptions, ingest};

@@ -93,6 +93,11 @@ impl Place {
         folder.join(format!("{run}.parquet"))
     }
 
+    /// The parts of a file's path below the fleet's folder.
+    pub(crate) fn in_fleet(&self, path: &Path) -> Vec<String> {
+        path.parts().skip(self.folder.parts().count()).map(|part| part.as_ref().to_owned()).collect()
+    }
+
     /// The files of all runs, in order of their paths.
     ///
     /// # Errors

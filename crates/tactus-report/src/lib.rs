@@ -5,7 +5,7 @@
 //! recording always gives the same page.
 //!
 //! [`figures`] computes the paper's figures from the model. [`calibration`] reports a calibration, [`discovery`] the
-//! effects that a model was missing, [`study`] a repetition of the paper on one rig.
+//! effects that a model was missing, [`study`] a repetition of the paper on one rig, [`fleet`] what many runs say together.
 //!
 //! [`viewer_file`] writes a recording for stock MCAP viewers; [`viewer`] makes the messages, live ones too.
 //!
@@ -16,6 +16,7 @@ pub mod calibration;
 pub mod discovery;
 pub mod figures;
 pub mod fit;
+pub mod fleet;
 pub mod plot;
 pub mod study;
 pub mod viewer;

@@ -18,7 +18,7 @@ use tempfile::SpooledTempFile;
 use tokio::{io::AsyncWriteExt as _, runtime::Handle};
 
 use crate::{
-    Place, PlaceError, RunHead,
+    Place, RunHead,
     columns::{Rows, SCHEMA},
 };
 
@@ -56,8 +56,6 @@ pub(super) enum WriteError {
     Temporary { run: String, source: io::Error },
     #[error("run {run:?} cannot be written to {place}: {source}")]
     Upload { run: String, place: String, source: io::Error },
-    #[error(transparent)]
-    Place(#[from] PlaceError),
 }
 
 /// The file of one run.

@@ -19,19 +19,21 @@ fn the_commands_of_the_page_do_what_it_says() {
     fs::set_permissions(&tactus, fs::Permissions::from_mode(0o755)).unwrap();
     let mut blocks = 0;
     let mut rest = PAGE;
-    while let Some((_, after)) = rest.split_once("```sh by=fleet\n") {
+    while let Some((_, after)) = rest.split_once("```sh by=fleet") {
+        let (info, after) = after.split_once('\n').unwrap();
         let (block, after) = after.split_once("```").unwrap();
-        run(block, &lab.path(""), &programs);
+        let code = info.trim().strip_prefix("exit=").map_or(0, |code| code.parse().unwrap());
+        assert_eq!(run(block, &lab.path(""), &programs), Some(code), "{block}");
         (rest, blocks) = (after, blocks + 1);
     }
     assert!(blocks > 0, "the page has commands");
 }
 
-fn run(block: &str, folder: &Path, programs: &Path) {
+/// Runs a block and returns its exit code.
+fn run(block: &str, folder: &Path, programs: &Path) -> Option<i32> {
     let known = env::var_os("PATH").unwrap();
     let path = [programs.to_owned()].into_iter().chain(env::split_paths(&known));
     let mut shell = Command::new("bash");
     shell.args(["-euo", "pipefail", "-c", block]).current_dir(folder);
-    let said = shell.env("PATH", env::join_paths(path).unwrap()).output().unwrap();
-    assert!(said.status.success(), "{block}\n{said:?}");
+    shell.env("PATH", env::join_paths(path).unwrap()).status().unwrap().code()
 }

@@ -6,6 +6,7 @@ use std::{
     fs,
     path::{Path, PathBuf},
     process::{Command, Output},
+    sync::Arc,
 };
 
 use serde_json::Value;
@@ -52,6 +53,18 @@ impl Lab {
 
     /// Records a run of so many presses into `runs`.
     pub(crate) fn record(&self, rig: &str, run_id: &str, started_ns: i64, presses: usize) -> PathBuf {
+        self.record_with_gain(rig, run_id, started_ns, presses, 1.0)
+    }
+
+    /// The same with a sensor whose rises are multiplied.
+    pub(crate) fn record_with_gain(
+        &self,
+        rig: &str,
+        run_id: &str,
+        started_ns: i64,
+        presses: usize,
+        gain: f64,
+    ) -> PathBuf {
         let mut run = Plan { run_id: run_id.to_owned(), ..Plan::short(presses) }.make();
         rig.clone_into(&mut run.rig.name);
         let path = self.path(&format!("runs/{run_id}/recording.mcap"));
@@ -74,8 +87,9 @@ impl Lab {
         let mut recording = Recording::create(&path, &header).unwrap();
         for fed in &mut run.fed {
             match fed {
+                Fed::Frame(frame) => frame.counts = amplified(&frame.counts, gain),
                 Fed::Info(info, _) => rig.clone_into(&mut info.rig),
-                Fed::Frame(_) | Fed::Stage(_) | Fed::Event(_) => {}
+                Fed::Stage(_) | Fed::Event(_) => {}
             }
             fed.write(&mut recording).unwrap();
         }
@@ -110,6 +124,12 @@ impl Lab {
         files.sort();
         files
     }
+}
+
+/// Counts whose rises above the baseline of 100 are multiplied.
+fn amplified(counts: &[f32], gain: f64) -> Arc<[f32]> {
+    #[expect(clippy::cast_possible_truncation, reason = "counts are of single precision")]
+    counts.iter().map(|counts| (100.0 + gain * (f64::from(*counts) - 100.0)) as f32).collect()
 }
 
 fn collect(root: &Path, folder: &Path, files: &mut Vec<String>) {

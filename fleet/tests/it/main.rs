@@ -3,5 +3,6 @@
 mod book;
 mod ingest;
 mod lab;
+mod survey;
 #[path = "../../../crates/tactus-record/examples/synthetic/mod.rs"]
 mod synthetic;
