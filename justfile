@@ -268,6 +268,11 @@ bench-rigs *arguments="1,50,100 --record --search 3":
     cargo build --profile dist --package tactus-daemon --package tactus-bench
     target/dist/tactus-bench rigs {{ arguments }}
 
+# A fleet of synthetic runs in growing sizes: rows/s, memory, bytes. docs/scale.md.
+bench-fleet *arguments: fleet-tools
+    cd fleet && cargo build --release --bin tactus-fleet --example synthetic_tables
+    {{ tools }}/fleet/bin/python fleet/bench/measure.py --programs fleet/target/release {{ arguments }}
+
 # Both panels of Fig. 6 beside a numpy program.
 bench-acuity *arguments: bench-peers-tools
     cargo build --profile dist --package tactus-bench
