@@ -308,6 +308,50 @@ fn two_rigs_of_one_name_are_named_and_neither_is_recorded() {
     assert!(totals["problem"].as_str().unwrap().contains("name of its own"), "{totals}");
 }
 
+/// A small disk, in memory, which needs root.
+struct SmallDisk(PathBuf);
+
+impl SmallDisk {
+    fn mount(path: PathBuf) -> Option<Self> {
+        fs::create_dir(&path).unwrap();
+        let mounted =
+            Command::new("mount").args(["-t", "tmpfs", "-o", "size=72m", "tmpfs"]).arg(&path).status();
+        mounted.is_ok_and(|status| status.success()).then_some(Self(path))
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        drop(Command::new("umount").arg(&self.0).status());
+    }
+}
+
+#[test]
+fn a_full_disk_ends_the_collector_and_its_file_says_so() {
+    let folder = TempDir::new().unwrap();
+    let Some(disk) = SmallDisk::mount(folder.path().join("collected")) else {
+        return eprintln!("not tested: this user may not mount a disk");
+    };
+    // Its router is not there.
+    let host = Host::new("left", &free_endpoint(), 1_800);
+    let _daemon = host.serve();
+    let mut collector = collect(folder.path(), &host.endpoint, &[]);
+    collector.wait_for("left: found");
+    wait_until_collected(folder.path(), "left", host.wait_for_frames(5));
+    let fill = disk.0.join("fill");
+    fs::write(&fill, vec![0; 80 << 20]).unwrap_err();
+    let (code, said) = collector.wait();
+    assert!(code == Some(1) && said.contains("No space left"), "{code:?}: {said}");
+    fs::remove_file(fill).unwrap();
+    let file = recordings(&disk.0.join("left")).remove(0).display().to_string();
+    let info = tactus(folder.path(), &["record", "info", "--json", &file]).json();
+    assert_eq!(
+        (&info["exit_status"], &info["completeness"]["state"]),
+        (&"failed".into(), &"complete".into()),
+        "{info}"
+    );
+}
+
 /// Two hosts with a cable between them: network namespaces, which nothing else reaches.
 struct Cable {
     near: String,

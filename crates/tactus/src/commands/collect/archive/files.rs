@@ -163,8 +163,10 @@ impl Files {
             dwells: tally.dwells(),
             duration_s: tally.duration().as_secs_f64(),
         };
-        open.tell(self.at, Event::Finished(finished))?;
+        // A recording that failed before ends itself, in the space that it has in reserve, and says so.
+        let told = open.recording.flush().and_then(|()| open.tell(self.at, Event::Finished(finished)));
         let summary = open.recording.finish()?;
+        told?;
         self.totals.files += 1;
         self.totals.bytes += summary.bytes;
         Ok(())
