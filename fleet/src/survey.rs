@@ -68,6 +68,23 @@ pub(crate) enum Outcome<T> {
 
 const SCHEMA: &str = "tactus.fleet.result/1";
 
+#[cfg(test)]
+impl<T> RunResult<T> {
+    /// A result for tests of what results say together.
+    pub(crate) fn new(run: &str, rig: &str, outcome: Outcome<T>) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            run: run.to_owned(),
+            rig: rig.to_owned(),
+            date: "2026-03-25".to_owned(),
+            started_ns: None,
+            simulated: true,
+            bytes: 0,
+            outcome,
+        }
+    }
+}
+
 /// What a survey did.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub(crate) struct Surveyed {

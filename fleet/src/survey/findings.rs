@@ -159,3 +159,7 @@ fn effects(discovered: &[RunResult<Discovered>]) -> Vec<MissingEffect> {
     effects.sort_by_key(|missing| std::cmp::Reverse(missing.rigs.len()));
     effects
 }
+
+#[cfg(test)]
+#[path = "findings_tests.rs"]
+mod tests;
