@@ -279,16 +279,18 @@ fn print(reply: &pb::CommandReply) {
         fields.push(("note", reply.note.clone()));
     }
     print_fields(&fields);
-    if let Some(next) = next_command(&state) {
+    if let Some(next) = next_command(&state, holder(reply).is_some()) {
         say_next(&next);
     }
 }
 
-/// What a person is likely to do in this state of the service; a fault says it itself.
-fn next_command(state: &pb::RunState) -> Option<String> {
+/// What a person is likely to do in this state of the service; a fault says it itself. While somebody else holds the lease, who pauses or
+/// resumes takes it over.
+fn next_command(state: &pb::RunState, is_held: bool) -> Option<String> {
     if !state.fault.is_empty() {
         return None;
     }
+    let take_over = if is_held { " --take-over REASON" } else { "" };
     match state.phase() {
         pb::RunPhase::Finished if state.exit_status() == pb::ExitStatus::Stopped => {
             Some(format!("`tactus run --continue {}` goes on with it", state.run_id))
@@ -296,10 +298,12 @@ fn next_command(state: &pb::RunState) -> Option<String> {
         pb::RunPhase::Idle | pb::RunPhase::Unspecified | pb::RunPhase::Finished => {
             Some("`tactus run EXPERIMENT` runs one of `tactus experiments`".to_owned())
         }
-        pb::RunPhase::Paused => Some("`tactus resume` continues, `tactus stop` ends the run".to_owned()),
-        pb::RunPhase::Preparing | pb::RunPhase::Running => {
-            Some("`tactus watch` shows it live, `tactus pause` and `tactus stop` hold and end it".to_owned())
+        pb::RunPhase::Paused => {
+            Some(format!("`tactus resume{take_over}` continues, `tactus stop` ends the run"))
         }
+        pb::RunPhase::Preparing | pb::RunPhase::Running => Some(format!(
+            "`tactus watch` shows it live, `tactus pause{take_over}` holds it, `tactus stop` ends it"
+        )),
         pb::RunPhase::Stopping => None,
     }
 }
@@ -332,3 +336,7 @@ fn holder(reply: &pb::CommandReply) -> Option<&pb::Lease> {
 pub(crate) fn fault_words(fault: &str) -> String {
     format!("{fault}: make sure that the tip is free to move, then run `tactus reset`")
 }
+
+#[cfg(test)]
+#[path = "control_tests.rs"]
+mod tests;
