@@ -11,11 +11,7 @@ use std::{
     fmt,
     num::NonZeroUsize,
     path::{Path, PathBuf},
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicUsize, Ordering},
-    },
-    thread,
+    sync::{Mutex, PoisonError},
 };
 
 use jiff::civil::Date;
@@ -28,6 +24,7 @@ use crate::{
     Place,
     output::{in_mb, number_of},
     progress::Now,
+    threads::for_each,
 };
 use found::{Job, Source, found};
 use run_writer::{RunWriter, WriteError, Written};
@@ -112,7 +109,6 @@ pub fn ingest(
 ) -> Result<Ingested, IngestError> {
     let (jobs, unreadable) = found(paths)?;
     let shared = Shared {
-        next: AtomicUsize::new(0),
         now: Mutex::new(Now {
             files: 0,
             files_all: jobs.iter().map(|job| job.sources.len()).sum(),
@@ -130,16 +126,9 @@ pub fn ingest(
             failed: unreadable,
         }),
     };
-    thread::scope(|scope| {
-        for _ in 0..options.threads.get().min(jobs.len()) {
-            scope.spawn(|| {
-                while let Some(job) = jobs.get(shared.next.fetch_add(1, Ordering::Relaxed)) {
-                    let done =
-                        JobInProgress { runtime, place, options, job, open: None, closed: Vec::new() }.run();
-                    shared.take(job, done, progress);
-                }
-            });
-        }
+    for_each(options.threads, &jobs, |job| {
+        let done = JobInProgress { runtime, place, options, job, open: None, closed: Vec::new() }.run();
+        shared.take(job, done, progress);
     });
     let mut ingested = shared.ingested.into_inner().unwrap_or_else(PoisonError::into_inner);
     ingested.warnings.sort();
@@ -149,8 +138,6 @@ pub fn ingest(
 
 /// What the threads share.
 struct Shared {
-    /// The next job.
-    next: AtomicUsize,
     now: Mutex<Now>,
     ingested: Mutex<Ingested>,
 }

@@ -11,6 +11,7 @@
 //! | `run_head` | what a file says of its run, in its metadata |
 //! | `ingest` | from recordings to files |
 //! | `survey` | calibration and discovery of every run, and what they say together |
+//! | `threads` | how both share their work |
 #![expect(clippy::print_stderr, reason = "errors go to standard error, results to standard output")]
 
 mod cli;
@@ -22,6 +23,7 @@ mod place;
 mod progress;
 mod run_head;
 mod survey;
+mod threads;
 
 pub use cli::main;
 pub use ingest::{FailedFile, IngestError, Ingested, Options as IngestOptions, ingest};

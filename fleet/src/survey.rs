@@ -12,11 +12,7 @@ use std::{
     fs, io,
     num::NonZeroUsize,
     path::{Path, PathBuf},
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicUsize, Ordering},
-    },
-    thread,
+    sync::{Mutex, PoisonError},
 };
 
 use anyhow::Context as _;
@@ -26,7 +22,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use tempfile::NamedTempFile;
 use tokio::{io::AsyncWriteExt as _, runtime::Handle};
 
-use crate::{Place, RunHead, progress::Now};
+use crate::{Place, RunHead, progress::Now, threads::for_each};
 
 pub(crate) use calibrated::Calibrated;
 pub(crate) use discovered::Discovered;
@@ -101,7 +97,6 @@ pub(crate) fn survey<T: Analysis>(
     progress: &(dyn Fn(Now) + Sync),
 ) -> anyhow::Result<Surveyed> {
     let files = runtime.block_on(place.files())?;
-    let next = AtomicUsize::new(0);
     let now = Now {
         files: 0,
         files_all: files.len(),
@@ -110,26 +105,22 @@ pub(crate) fn survey<T: Analysis>(
     };
     let state = Mutex::new((now, Surveyed::default(), None::<anyhow::Error>));
     let failed = || state.lock().unwrap_or_else(PoisonError::into_inner).2.is_some();
-    thread::scope(|scope| {
-        for _ in 0..threads.get().min(files.len()) {
-            scope.spawn(|| {
-                while let Some(file) = files.get(next.fetch_add(1, Ordering::Relaxed))
-                    && !failed()
-                {
-                    let done = one::<T>(runtime, place, out, file);
-                    let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
-                    let (now, surveyed, error) = &mut *state;
-                    match done {
-                        Ok(true) => surveyed.runs_analysed += 1,
-                        Ok(false) => surveyed.runs_kept += 1,
-                        Err(failed) => *error = Some(failed),
-                    }
-                    now.files += 1;
-                    now.bytes += file.size;
-                    progress(*now);
-                }
-            });
+    for_each(threads, &files, |file| {
+        // Nothing more is begun after a failure.
+        if failed() {
+            return;
         }
+        let done = one::<T>(runtime, place, out, file);
+        let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+        let (now, surveyed, error) = &mut *state;
+        match done {
+            Ok(true) => surveyed.runs_analysed += 1,
+            Ok(false) => surveyed.runs_kept += 1,
+            Err(failed) => *error = Some(failed),
+        }
+        now.files += 1;
+        now.bytes += file.size;
+        progress(*now);
     });
     match state.into_inner().unwrap_or_else(PoisonError::into_inner) {
         (_, _, Some(error)) => Err(error),

@@ -124,10 +124,14 @@ impl Next {
     }
 }
 
+/// Where progress is drawn, if anybody wants to see it.
+fn target(silent: bool) -> ProgressDrawTarget {
+    if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() }
+}
+
 /// Draws until the run is over.
 fn draw(next: &Next, silent: bool, title: String) {
-    let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-    let bar = ProgressBar::with_draw_target(None, target).with_prefix(title);
+    let bar = ProgressBar::with_draw_target(None, target(silent)).with_prefix(title);
     let styled = |template| {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
@@ -194,10 +198,9 @@ impl ComputationProgress {
     /// So that the time so far goes on in a long step.
     const TICK: Duration = Duration::from_secs(1);
     pub(crate) fn new(silent: bool) -> Self {
-        let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         // Cleared, too, when an error ends the computation.
-        let bar =
-            ProgressBar::with_draw_target(Some(Self::STEPS), target).with_finish(ProgressFinish::AndClear);
+        let bar = ProgressBar::with_draw_target(Some(Self::STEPS), target(silent))
+            .with_finish(ProgressFinish::AndClear);
         if let Ok(style) =
             ProgressStyle::with_template("{bar:30.cyan/dim} {percent:>3} %  {elapsed:>4}  {msg}")
         {
@@ -227,8 +230,7 @@ pub(crate) struct Busy(ProgressBar);
 
 impl Busy {
     pub(crate) fn with(what: &'static str, silent: bool) -> Self {
-        let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let bar = ProgressBar::with_draw_target(None, target)
+        let bar = ProgressBar::with_draw_target(None, target(silent))
             .with_finish(ProgressFinish::AndClear)
             .with_message(what);
         if let Ok(style) = ProgressStyle::with_template("{msg}  {elapsed:>4}") {

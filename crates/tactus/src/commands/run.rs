@@ -54,9 +54,12 @@ pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
 /// Runs, writes the report, and says how it ended.
 pub(super) fn run_subject(common: &Common, args: &RunArgs, subject: Subject) -> anyhow::Result<Exit> {
     let summary = execute_at_source(common, args, subject, None)?;
-    let busy = (!args.no_report).then(|| Busy::with("writing the report", common.json));
-    let report = if args.no_report { None } else { make_report(&summary, &args.out) };
-    drop(busy);
+    let report = if args.no_report {
+        None
+    } else {
+        let _busy = Busy::with("writing the report", common.json);
+        make_report(&summary, &args.out)
+    };
     if common.json {
         say(&to_json(&summary, report.as_deref()).to_string());
     } else {
