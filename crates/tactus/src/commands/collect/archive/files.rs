@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::iter;
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -262,8 +263,9 @@ impl Open {
             ("schema".to_owned(), "tactus.v1".to_owned()),
         ]);
         // Another file of the same second has the name already.
-        let names = std::iter::once(id.clone()).chain((2..).map(|nth| format!("{id}-{nth}")));
-        let free = names.map(|id| (folder.join(format!("{id}.mcap")), id)).find(|(path, _)| !path.exists());
+        let free = file_names(&id)
+            .map(|id| (folder.join(format!("{id}.mcap")), id))
+            .find(|(path, _)| !path.exists());
         let (path, id) = free.unwrap_or_else(|| (folder.join(format!("{id}.mcap")), id));
         let header = Header {
             run_id: &id,
@@ -298,7 +300,17 @@ impl Open {
     }
 }
 
+/// Names of files that begin in one second. Whoever sorts the files by name, as `ls` does, has them in the order of time.
+fn file_names(id: &str) -> impl Iterator<Item = String> {
+    // `_` sorts behind the `.` of the first one, `-` before it.
+    iter::once(id.to_owned()).chain((2..).map(move |nth: u32| format!("{id}_{nth}")))
+}
+
 fn now() -> WallTime {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     WallTime::from_ns(i64::try_from(since.as_nanos()).unwrap_or(i64::MAX))
 }
+
+#[cfg(test)]
+#[path = "files_tests.rs"]
+mod tests;
