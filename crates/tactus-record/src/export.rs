@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::{
-    EpochClock, RowsError, Timeline,
+    EpochClock, RowsError, Timeline, meter,
     rows::{RowSources, is_one_calibration},
     table::{FormatWriter, TableFormat},
 };
@@ -70,6 +70,8 @@ pub fn export_as<P: AsRef<Path>>(
 ) -> Result<ExportSummary, RowsError> {
     let out = out.into();
     let [first, rest @ ..] = recordings else { return Err(RowsError::Nothing) };
+    // For the motion of the stage, then for the frames.
+    meter::will_read(recordings, 2);
     let first = Timeline::read(first)?;
     let mut table = FormatWriter::create(format, out.clone(), first.rig_json())?;
     let mut sources = RowSources::of(recordings)?;

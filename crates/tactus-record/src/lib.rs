@@ -14,6 +14,7 @@
 //!
 //! Everything here blocks: callers run it on a thread of its own.
 
+pub mod meter;
 pub mod rows;
 pub mod space;
 pub mod table;

@@ -13,6 +13,7 @@ use tactus_schema::WallTime;
 use crate::{
     Completeness, Message, RecordError,
     header::{Attachment, METADATA_NAME, RunMetadata},
+    meter::MeteredFile,
     scan::{RawMessage, Scan, ScanItem},
 };
 
@@ -37,7 +38,7 @@ pub enum Entry {
 /// Gives a recording's entries in order, around whatever is damaged. It never holds more than one chunk in memory.
 ///
 /// The iterator gives an error only if the file system does. At the end, [`Reader::completeness`] says what was damaged.
-pub struct Reader<R = BufReader<File>> {
+pub struct Reader<R = BufReader<MeteredFile>> {
     scan: Scan<R>,
     topics: BTreeMap<u16, Arc<str>>,
 }
@@ -51,7 +52,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Reader, RecordError> {
     if !is_mcap(&first_bytes(path)?) {
         return Err(RecordError::NotMcap { path: path.to_owned() });
     }
-    Ok(Reader::new(BufReader::with_capacity(64 * 1024, open(path)?)))
+    Ok(Reader::new(BufReader::with_capacity(64 * 1024, MeteredFile(open(path)?))))
 }
 
 /// Opens a recording and reads up to the run's metadata.

@@ -21,7 +21,8 @@ use crate::{
     channel::{ChannelIds, declare, unsigned, wrapped, writer},
     confirmed::Confirmed,
     header::{METADATA_NAME, RIG_JSON, RIG_TOML},
-    info,
+    info, meter,
+    meter::MeteredFile,
     reader::{decode, first_bytes, io_error, is_mcap},
     scan::{RawMessage, Scan, ScanItem},
     storage::sync_folder_of,
@@ -78,6 +79,8 @@ impl fmt::Display for LastPress {
 /// not read back.
 pub fn recover(path: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<Recovery, RecordError> {
     let (path, out) = (path.as_ref(), out.as_ref());
+    // To see what is intact, to copy it, and to read the copy again.
+    meter::will_read(&[path], 3);
     let survey = Survey::of(path)?;
     if survey.completeness == Completeness::Complete && survey.tally.finished().is_some() {
         return Err(RecordError::NothingToRecover { path: path.to_owned() });
@@ -116,7 +119,7 @@ impl Survey {
         let unread = |source| io_error(path, source);
         let file = File::open(path).map_err(unread)?;
         let bytes = file.metadata().map_err(unread)?.len();
-        let mut scan = Scan::new(BufReader::new(file));
+        let mut scan = Scan::new(BufReader::new(MeteredFile(file)));
         let mut found = Found::default();
         while let Some(item) = scan.next_item().map_err(unread)? {
             found.take(item);
@@ -278,7 +281,7 @@ struct Copied {
 fn rewrite(path: &Path, out: &Path, file: File, survey: &Survey) -> Result<Copied, RecordError> {
     let unwritten = |source| RecordError::Write { path: out.to_owned(), source };
     let source = File::open(path).map_err(|source| io_error(path, source))?;
-    let mut scan = Scan::new(BufReader::new(source));
+    let mut scan = Scan::new(BufReader::new(MeteredFile(source)));
     let mut copy = RecordingCopy::new(file, survey).map_err(unwritten)?;
     while let Some(item) = scan.next_item().map_err(|source| io_error(path, source))? {
         match item {

@@ -14,7 +14,7 @@ use tactus_schema::{
 };
 
 use crate::{
-    Completeness, Entry, Message, RowsError, Sampling, Timeline,
+    Completeness, Entry, Message, RowsError, Sampling, Timeline, meter,
     reader::{first_bytes, io_error, is_mcap, read, read_run},
     rig_groups::{RigGroups, differences},
     table::{Checker, TableReader},
@@ -79,6 +79,7 @@ pub fn visit<P: AsRef<Path>>(
     paths: &[P],
     mut take: impl FnMut(&Rig, RowView<'_>),
 ) -> Result<Source, RowsError> {
+    announce(paths);
     let mut sources = RowSources::of(paths)?;
     let mut take = |rig: &Rig, row: RowView<'_>| {
         take(rig, row);
@@ -88,6 +89,14 @@ pub fn visit<P: AsRef<Path>>(
         sources.file(path, &mut take).map_err(|error| error.with_groups(paths, is_one_sensor))?;
     }
     sources.into_source()
+}
+
+/// Says what [`visit`] will read: recordings for the motion of the stage, then for the frames; tables once.
+fn announce<P: AsRef<Path>>(paths: &[P]) {
+    for path in paths.iter().map(AsRef::as_ref) {
+        let times = if first_bytes(path).is_ok_and(|start| is_mcap(&start)) { 2 } else { 1 };
+        meter::will_read(&[path], times);
+    }
 }
 
 /// The presses in recordings and measurement tables, for a calibration.

@@ -10,7 +10,7 @@ mod summary;
 use std::path::Path;
 
 use tactus_model::Array;
-use tactus_record::{Completeness, RecordError, Timeline};
+use tactus_record::{Completeness, RecordError, Timeline, meter};
 
 pub use comparisons::{Comparisons, Directions, Ladder, PlaceMap, PressCurve};
 pub use frames::{FrameLoss, Intervals, Timing, Trace};
@@ -71,6 +71,8 @@ pub enum ReportError {
 /// If the file cannot be read, or does not name its run and rig. Anything else that is missing is listed in
 /// [`RunReport::notes`].
 pub fn run_report(recording: &Path) -> Result<RunReport, ReportError> {
+    // For the motion of the stage, then for the frames.
+    meter::will_read(&[recording], 2);
     let timeline = Timeline::read(recording)?;
     let frames = FrameStatistics::read(recording, &timeline)?;
     let presses = Presses::of(&timeline, &frames);

@@ -14,7 +14,7 @@ use std::{
 };
 
 use mcap::records::MessageHeader;
-use tactus_record::{Entry, Message, Timeline, read};
+use tactus_record::{Entry, Message, Timeline, meter, read};
 use tactus_schema::{
     Frame, Rig, WallTime,
     pb::{self, run_event::Event},
@@ -42,6 +42,8 @@ pub struct ViewerFile {
 /// If the recording cannot be read, or the file cannot be written.
 pub fn viewer_file(recording: &Path, out: impl Into<PathBuf>) -> Result<ViewerFile, ReportError> {
     let out = out.into();
+    // For the motion of the stage, for the greatest rise, then for all messages.
+    meter::will_read(&[recording], 3);
     let timeline = Timeline::read(recording)?;
     let part = with_suffix(&out, ".part");
     let written = write(recording, &timeline, &part);

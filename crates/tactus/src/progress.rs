@@ -1,5 +1,6 @@
 //! Progress bars for runs and for computations.
 
+use std::fmt;
 use std::io::{self, Write as _};
 use std::mem;
 use std::sync::mpsc::{Receiver, channel};
@@ -7,7 +8,8 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressState, ProgressStyle};
+use tactus_record::meter;
 use tactus_runner::twin::Attend;
 use tactus_schema::pb::{RunPhase, RunState};
 
@@ -129,15 +131,30 @@ fn target(silent: bool) -> ProgressDrawTarget {
     if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() }
 }
 
+/// In a template, `{left}` is the time left if the rest takes as long as its share: empty while that says nothing yet.
+fn styled(bar: &ProgressBar, template: &str) {
+    let left = |state: &ProgressState, to: &mut dyn fmt::Write| {
+        let (done, elapsed) = (f64::from(state.fraction()), state.elapsed());
+        if elapsed >= ComputationProgress::TICK && done >= 0.01 {
+            // Nothing can be done about a line that does not fit.
+            let _full = write!(to, "{} left", duration(elapsed.as_secs_f64() * (1.0 - done) / done));
+        }
+    };
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style.with_key("left", left));
+    }
+}
+
+/// Shows a share, 0 to 1, of a bar of [`ComputationProgress::STEPS`].
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to STEPS")]
+fn set_share(bar: &ProgressBar, share: f64) {
+    bar.set_position((share.clamp(0.0, 1.0) * ComputationProgress::STEPS as f64) as u64);
+}
+
 /// Draws until the run is over.
 fn draw(next: &Next, silent: bool, title: String) {
     let bar = ProgressBar::with_draw_target(None, target(silent)).with_prefix(title);
-    let styled = |template| {
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
-    };
-    styled("{prefix}dry run  {elapsed:>4}  {msg}");
+    styled(&bar, "{prefix}dry run  {elapsed:>4}  {msg}");
     let mut is_rehearsing = true;
     loop {
         let DrawingOrder { state, rehearsed, lines, is_over } = next.take();
@@ -156,7 +173,7 @@ fn draw(next: &Next, silent: bool, title: String) {
         if let Some(state) = state {
             if mem::take(&mut is_rehearsing) {
                 bar.disable_steady_tick();
-                styled("{prefix}{bar:30.cyan/dim} {pos}/{len} presses  {msg}");
+                styled(&bar, "{prefix}{bar:30.cyan/dim} {pos}/{len} presses  {msg}");
             }
             show(&bar, &state);
         }
@@ -201,20 +218,14 @@ impl ComputationProgress {
         // Cleared, too, when an error ends the computation.
         let bar = ProgressBar::with_draw_target(Some(Self::STEPS), target(silent))
             .with_finish(ProgressFinish::AndClear);
-        if let Ok(style) =
-            ProgressStyle::with_template("{bar:30.cyan/dim} {percent:>3} %  {elapsed:>4}  {msg}")
-        {
-            bar.set_style(style);
-        }
+        styled(&bar, "{bar:30.cyan/dim} {percent:>3} %  {elapsed:>4}  {msg}");
         bar.enable_steady_tick(Self::TICK);
         Self { bar }
     }
 
     /// Shows the current step and the share done, 0 to 1.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to STEPS")]
     pub(crate) fn show(&self, what: &str, share: f64) {
-        let share = share.clamp(0.0, 1.0);
-        self.bar.set_position((share * Self::STEPS as f64) as u64);
+        set_share(&self.bar, share);
         self.bar.set_message(what.to_owned());
     }
 
@@ -224,20 +235,37 @@ impl ComputationProgress {
     }
 }
 
-/// Work of which nobody knows how long it takes: what it is, and the time so far. Hidden where [`RunProgress`] is; ends with this.
+/// Work of unknown length: what it is, and the time so far. While it reads files ([`Busy::reads`]), the share of them and the time left. Hidden where [`RunProgress`] is; ends with this.
 #[derive(Debug)]
 pub(crate) struct Busy(ProgressBar);
 
 impl Busy {
     pub(crate) fn with(what: &'static str, silent: bool) -> Self {
-        let bar = ProgressBar::with_draw_target(None, target(silent))
-            .with_finish(ProgressFinish::AndClear)
-            .with_message(what);
-        if let Ok(style) = ProgressStyle::with_template("{msg}  {elapsed:>4}") {
-            bar.set_style(style);
-        }
-        bar.enable_steady_tick(ComputationProgress::TICK);
-        Self(bar)
+        let bar = ProgressBar::with_draw_target(Some(ComputationProgress::STEPS), target(silent))
+            .with_finish(ProgressFinish::AndClear);
+        let busy = Self(bar);
+        busy.goes_on(what);
+        busy.0.enable_steady_tick(ComputationProgress::TICK);
+        busy
+    }
+
+    /// Does a job that reads files: see [`meter::will_read`].
+    pub(crate) fn reads<T>(&self, job: impl FnOnce() -> T) -> T {
+        let bar = self.0.clone();
+        let tell = move |share| {
+            // Only now, because not every job says what it will read.
+            if bar.position() == 0 {
+                styled(&bar, "{msg}  {bar:30.cyan/dim} {percent:>3} %  {left}");
+            }
+            set_share(&bar, share);
+        };
+        meter::metered(tell, job)
+    }
+
+    /// Shows work that follows, with the time since the beginning.
+    pub(crate) fn goes_on(&self, what: &'static str) {
+        styled(&self.0, "{msg}  {elapsed:>4}");
+        self.0.set_message(what);
     }
 }
 

@@ -19,6 +19,8 @@ use tactus_schema::{
     table::{Phase, RIG_METADATA_KEY, RowView},
 };
 
+use crate::meter;
+
 use super::{
     TableError, TableHead,
     check::Checker,
@@ -77,6 +79,7 @@ impl TableReader {
             let source = ColumnReader { path: &path, group: group.as_ref(), first_row };
             let group = undamaged(&path, index, || RowGroup::read(&source, &leaves, elements))?;
             first_row += group.visit(&source, &mut checker, &mut take)?;
+            meter::count(u64::try_from(file.metadata().row_group(index).compressed_size()).unwrap_or(0));
         }
         Ok(head)
     }

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use serde::Serialize;
-use tactus_calibrate::{Calibration, Declared};
-use tactus_record::rows::{self, RunSource};
+use tactus_calibrate::{Calibration, Declared, Readings};
+use tactus_record::rows::{self, RunSource, Source};
 use tactus_report::calibration::{CalibrationReport, calibration_html};
 use tactus_schema::{Model, Rig};
 
@@ -49,8 +49,10 @@ struct CalibrationJson<'a> {
 }
 
 pub(crate) fn calibrate(common: &Common, args: &CalibrateArgs) -> anyhow::Result<Exit> {
-    let busy = Busy::with("reading and fitting", common.json);
-    let calibrated = from_files(&args.files)?;
+    let busy = Busy::with("reading", common.json);
+    let measured = busy.reads(|| rows::readings(&args.files))?;
+    busy.goes_on("fitting");
+    let calibrated = from_readings(measured)?;
     let paths = write(&calibrated, &args.out)?;
     drop(busy);
     if common.json {
@@ -64,7 +66,10 @@ pub(crate) fn calibrate(common: &Common, args: &CalibrateArgs) -> anyhow::Result
 
 /// Reads the files and calibrates the sensor.
 pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
-    let (source, readings) = rows::readings(files)?;
+    from_readings(rows::readings(files)?)
+}
+
+fn from_readings((source, readings): (Source, Readings)) -> anyhow::Result<Calibrated> {
     if readings.frames == 0 {
         bail!("the files hold no frame");
     }

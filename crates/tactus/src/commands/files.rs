@@ -94,7 +94,7 @@ pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit>
     }
     let (out, format) = table_of(args)?;
     let busy = Busy::with("exporting", common.json);
-    let summary = tactus_record::export_as(&args.recordings, &out, format)?;
+    let summary = busy.reads(|| tactus_record::export_as(&args.recordings, &out, format))?;
     drop(busy);
     if common.json {
         println!("{}", serde_json::to_string(&summary)?);
@@ -129,7 +129,7 @@ fn export_for_viewers(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit
         return Err(Failure::new(Exit::Usage, what).into());
     }
     let busy = Busy::with("exporting", common.json);
-    let written = tactus_report::viewer_file(recording, out)?;
+    let written = busy.reads(|| tactus_report::viewer_file(recording, out))?;
     drop(busy);
     if common.json {
         println!("{}", serde_json::to_string(&written)?);
@@ -169,7 +169,7 @@ fn table_of(args: &ExportArgs) -> anyhow::Result<(PathBuf, TableFormat)> {
 pub(crate) fn recover(common: &Common, args: &RecoverArgs) -> anyhow::Result<Exit> {
     let out = args.out.clone().unwrap_or_else(|| beside(Some(&args.recording), "recovered.mcap"));
     let busy = Busy::with("reading what is intact", common.json);
-    let recovery = tactus_record::recover(&args.recording, &out)?;
+    let recovery = busy.reads(|| tactus_record::recover(&args.recording, &out))?;
     drop(busy);
     if common.json {
         println!(
@@ -205,7 +205,7 @@ pub(crate) fn recover(common: &Common, args: &RecoverArgs) -> anyhow::Result<Exi
 pub(crate) fn report(common: &Common, args: &ReportArgs) -> anyhow::Result<Exit> {
     let out = args.out.clone().unwrap_or_else(|| beside(Some(&args.recording), "report.html"));
     let busy = Busy::with("writing the report", common.json);
-    let path = write_report(&args.recording, &out)?;
+    let path = busy.reads(|| write_report(&args.recording, &out))?;
     drop(busy);
     if common.json {
         println!("{}", json!({ "report": path }));

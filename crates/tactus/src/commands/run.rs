@@ -57,8 +57,7 @@ pub(super) fn run_subject(common: &Common, args: &RunArgs, subject: Subject) -> 
     let report = if args.no_report {
         None
     } else {
-        let _busy = Busy::with("writing the report", common.json);
-        make_report(&summary, &args.out)
+        Busy::with("writing the report", common.json).reads(|| make_report(&summary, &args.out))
     };
     if common.json {
         say(&to_json(&summary, report.as_deref()).to_string());
