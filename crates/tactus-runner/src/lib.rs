@@ -31,4 +31,5 @@ pub mod signals;
 pub mod stage_check;
 pub mod twin;
 
+mod outline;
 mod virtual_time;

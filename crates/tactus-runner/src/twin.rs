@@ -13,6 +13,7 @@ use tokio::time::timeout;
 use tracing::subscriber::NoSubscriber;
 
 use crate::devices;
+use crate::outline::Outline;
 use crate::virtual_time;
 
 /// No run lasts longer.
@@ -21,13 +22,25 @@ const LONGEST: Duration = Duration::from_hours(72);
 /// How often who waits for a dry run is asked.
 const POLL: Duration = Duration::from_millis(20);
 
+/// After so many of these times, a second, somebody may want to know how much is left. Most dry runs are over before.
+const OUTLINED_AFTER: u32 = 50;
+
 /// Who waits for a dry run. Asked every 20 ms.
 pub trait Attend {
     /// True ends the dry run.
     fn stops(&self) -> bool;
 
-    /// The twin's run, as far as it is.
-    fn sees(&self, _run: &pb::RunState) {}
+    /// How far the twin's run is.
+    fn sees(&self, _so_far: SoFar) {}
+}
+
+/// How far a dry run is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SoFar {
+    /// Presses that are done.
+    pub presses: u32,
+    /// About what share of all steps is done, 0 to 1, in rig time. `None` within the first second, and if nobody knows.
+    pub share: Option<f64>,
 }
 
 impl<F: Fn() -> bool> Attend for F {
@@ -104,6 +117,10 @@ pub(crate) fn run_on(
         service.sensor.transport = Transport::Embedded;
         service.stage.transport = Transport::Embedded;
     }
+    let outline = Outline::of(&twin, &order);
+    if let Some(outline) = &outline {
+        order.evaluator = outline.evaluator();
+    }
     // One message: the twin's engine. The channel ends with the thread.
     let (started, engines) = sync_channel(1);
     // A separate runtime on a separate thread: the caller may be in another runtime.
@@ -113,20 +130,28 @@ pub(crate) fn run_on(
             virtual_time::runtime()?.block_on(run(twin, order, longest, record, &started))
         })
     })?;
-    attend(&engines, attendant);
+    attend(&engines, outline.as_ref(), attendant);
     thread.join().map_err(|_| TwinError::Panicked)?
 }
 
 /// Returns when the twin's thread has ended. Once the attendant stops it, it stops the twin's engine, even while a script computes.
-fn attend(engines: &Receiver<Engine>, attendant: &dyn Attend) {
+fn attend(engines: &Receiver<Engine>, outline: Option<&Outline>, attendant: &dyn Attend) {
     let mut twin: Option<Engine> = None;
-    loop {
+    let mut not_begun = outline;
+    for polls in 0_u32.. {
         match engines.recv_timeout(POLL) {
             Ok(engine) => twin = Some(engine),
             Err(RecvTimeoutError::Disconnected) => return,
             Err(RecvTimeoutError::Timeout) => {
                 let Some(twin) = &twin else { continue };
-                attendant.sees(&twin.run_state());
+                if polls >= OUTLINED_AFTER
+                    && let Some(outline) = not_begun.take()
+                {
+                    // Without a thread nobody knows how much is left.
+                    drop(outline.begin());
+                }
+                let share = outline.and_then(Outline::share);
+                attendant.sees(SoFar { presses: twin.run_state().presses, share });
                 if attendant.stops() {
                     let order = StopOrder { by: "request".into(), reason: String::new(), abort: false };
                     twin.stop(order);

@@ -113,7 +113,7 @@ impl Envelope {
 }
 
 /// How the stage moves; speeds within the envelope's.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Height at which the tip travels and to which it retracts.
     pub safe_height_mm: f64,

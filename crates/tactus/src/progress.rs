@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressState, ProgressStyle};
 use tactus_record::meter;
-use tactus_runner::twin::Attend;
+use tactus_runner::twin::{Attend, SoFar};
 use tactus_schema::pb::{RunPhase, RunState};
 
 use crate::output::duration;
@@ -37,8 +37,8 @@ struct Next {
 struct DrawingOrder {
     /// The latest state only.
     state: Option<RunState>,
-    /// Presses that a dry run has done so far.
-    rehearsed: Option<u32>,
+    /// How far a dry run is.
+    rehearsed: Option<SoFar>,
     /// At most [`LINES_MAX`]; more are dropped.
     lines: Vec<String>,
     is_over: bool,
@@ -70,9 +70,9 @@ impl RunProgress {
         self.next.change(|order| order.state = Some(state.clone()));
     }
 
-    /// Shows that the dry run goes on. How much of it is left nobody knows.
-    pub(crate) fn rehearse(&self, presses: u32) {
-        self.next.change(|order| order.rehearsed = Some(presses));
+    /// Shows how far the dry run is.
+    pub(crate) fn rehearse(&self, so_far: SoFar) {
+        self.next.change(|order| order.rehearsed = Some(so_far));
     }
 
     /// Prints a line above the bar.
@@ -105,8 +105,8 @@ impl Attend for RunProgress {
         false
     }
 
-    fn sees(&self, run: &RunState) {
-        self.rehearse(run.presses);
+    fn sees(&self, so_far: SoFar) {
+        self.rehearse(so_far);
     }
 }
 
@@ -165,10 +165,17 @@ fn draw(next: &Next, silent: bool, title: String) {
         if is_over {
             return bar.finish_and_clear();
         }
-        if let Some(presses) = rehearsed.filter(|_| is_rehearsing) {
+        if let Some(SoFar { presses, share }) = rehearsed.filter(|_| is_rehearsing) {
             // The time goes on without news.
             bar.enable_steady_tick(ComputationProgress::TICK);
             bar.set_message(if presses > 0 { format!("{presses} presses so far") } else { String::new() });
+            if let Some(share) = share {
+                if bar.length().is_none() {
+                    bar.set_length(ComputationProgress::STEPS);
+                    styled(&bar, "{prefix}dry run  {bar:30.cyan/dim} {percent:>3} %  {left}");
+                }
+                set_share(&bar, share);
+            }
         }
         if let Some(state) = state {
             if mem::take(&mut is_rehearsing) {

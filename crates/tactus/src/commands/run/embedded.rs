@@ -14,7 +14,7 @@ use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, TruthError, T
 use tactus_runner::experiments;
 use tactus_runner::order::RunRequest;
 use tactus_runner::script_process::ScriptProcesses;
-use tactus_runner::twin::Attend;
+use tactus_runner::twin::{Attend, SoFar};
 use tactus_schema::Rig;
 use tactus_schema::pb::{self, RunPhase, RunState};
 use tokio::sync::watch;
@@ -110,8 +110,8 @@ impl Attend for Waiting<'_> {
         StopsRun::is_asked()
     }
 
-    fn sees(&self, run: &RunState) {
-        self.0.sees(run);
+    fn sees(&self, so_far: SoFar) {
+        self.0.sees(so_far);
     }
 }
 

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use tactus_bus::{Client, History};
+use tactus_runner::twin::SoFar;
 use tactus_schema::key::Command;
 use tactus_schema::pb::{self, RunPhase, RunState};
 use tokio::signal::unix::{SignalKind, signal};
@@ -29,7 +30,7 @@ pub(super) async fn run(
     let mut states = client.subscribe::<RunState>(History::Last).await?;
     let held = connection::hold(&client, &args.lease).await?;
     let rehearsing = told.progress();
-    rehearsing.rehearse(0);
+    rehearsing.rehearse(SoFar { presses: 0, share: None });
     let request = pb::RunRequest { who: args.who.clone(), lease: held.secret(), ..request_of(subject) };
     let reply = connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await;
     rehearsing.clear();
