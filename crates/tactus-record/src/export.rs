@@ -70,8 +70,10 @@ pub fn export_as<P: AsRef<Path>>(
 ) -> Result<ExportSummary, RowsError> {
     let out = out.into();
     let [first, rest @ ..] = recordings else { return Err(RowsError::Nothing) };
-    // For the motion of the stage, then for the frames.
-    meter::will_read(recordings, 2);
+    for path in recordings {
+        // For the motion of the stage, then to write the rows.
+        meter::will_read(path, &[1.0, 2.0]);
+    }
     let first = Timeline::read(first)?;
     let mut table = FormatWriter::create(format, out.clone(), first.rig_json())?;
     let mut sources = RowSources::of(recordings)?;

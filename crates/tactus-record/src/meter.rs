@@ -1,6 +1,6 @@
 //! How far a job is with the files that it reads.
 //!
-//! A job says beforehand how often it reads which files; what this crate reads is then counted. The job runs on the thread that asked for it,
+//! A job says beforehand which files it will read, how often, and how long that takes in comparison; what this crate reads is then counted. The job runs on the thread that asked for it,
 //! and the meter is that thread's: the functions that read files neither know of meters nor pass them on.
 
 use std::{
@@ -18,36 +18,71 @@ thread_local! {
 
 /// Counts what one job reads.
 struct Meter {
-    /// Bytes that the job will have read in all.
-    due: Cell<u64>,
+    /// What it will read, in order.
+    passes: RefCell<Vec<Pass>>,
+    /// Number of passes that are over.
+    over: Cell<usize>,
+    /// Bytes that were read in the present one.
     read: Cell<u64>,
     tell: Box<dyn Fn(f64)>,
 }
 
-/// Does a job, and tells the share of its files that it has read, 0 to 1, after each piece.
+/// One reading of one file.
+#[derive(Clone, Copy)]
+struct Pass {
+    bytes: u64,
+    /// Time for each byte, in any unit.
+    cost: f64,
+}
+
+/// Does a job, and tells what share of it is done, 0 to 1, after each piece that it reads.
 pub fn metered<T>(tell: impl Fn(f64) + 'static, job: impl FnOnce() -> T) -> T {
-    let meter = Rc::new(Meter { due: Cell::new(0), read: Cell::new(0), tell: Box::new(tell) });
-    let _outer = Outer(METER.replace(Some(meter)));
+    let meter = Meter {
+        passes: RefCell::default(),
+        over: Cell::default(),
+        read: Cell::default(),
+        tell: Box::new(tell),
+    };
+    let _outer = Outer(METER.replace(Some(Rc::new(meter))));
     job()
 }
 
-/// Says that this thread is about to read each of the files so many times. Without a meter it does nothing.
-pub fn will_read<P: AsRef<Path>>(paths: &[P], times: u64) {
+/// Says that this thread is about to read a file, once for each of the costs, which say how long a byte takes in comparison with the other
+/// passes. Without a meter it does nothing.
+pub fn will_read(path: impl AsRef<Path>, costs: &[f64]) {
     with(|meter| {
         // A file that is not there is its reader's to tell.
-        let bytes = |path: &P| fs::metadata(path).map_or(0, |file| file.len());
-        meter.due.set(meter.due.get() + times * paths.iter().map(bytes).sum::<u64>());
+        let bytes = fs::metadata(path).map_or(0, |file| file.len());
+        meter.passes.borrow_mut().extend(costs.iter().map(|cost| Pass { bytes, cost: *cost }));
     });
 }
 
 /// Counts what was read.
 pub(crate) fn count(bytes: u64) {
-    with(|meter| {
-        meter.read.set(meter.read.get() + bytes);
-        if meter.due.get() > 0 {
-            (meter.tell)((meter.read.get() as f64 / meter.due.get() as f64).min(1.0));
+    with(|meter| meter.count(bytes));
+}
+
+impl Meter {
+    fn count(&self, bytes: u64) {
+        let passes = self.passes.borrow();
+        let (mut over, mut read) = (self.over.get(), self.read.get() + bytes);
+        while let Some(pass) = passes.get(over).filter(|pass| read >= pass.bytes) {
+            (over, read) = (over + 1, read - pass.bytes);
         }
-    });
+        (self.over.set(over), self.read.set(read));
+        let whole: f64 = passes.iter().map(Pass::length).sum();
+        let done: f64 = passes[..over].iter().map(Pass::length).sum();
+        let present = passes.get(over).map_or(0.0, |pass| read as f64 * pass.cost);
+        if whole > 0.0 {
+            (self.tell)(((done + present) / whole).min(1.0));
+        }
+    }
+}
+
+impl Pass {
+    fn length(&self) -> f64 {
+        self.bytes as f64 * self.cost
+    }
 }
 
 fn with(action: impl FnOnce(&Meter)) {

@@ -15,25 +15,33 @@ fn read(file: &NamedTempFile) {
 }
 
 #[test]
-fn the_share_is_of_all_files_and_passes() {
-    let files = [file(300), file(100)];
-    let told = Rc::new(RefCell::new(Vec::new()));
+fn the_share_is_of_all_files_and_passes_by_their_cost() {
+    let (long, short) = (file(300), file(100));
+    let told = Rc::new(Cell::new(None));
     let tell = {
         let told = Rc::clone(&told);
-        move |share| told.borrow_mut().push(share)
+        move |share| told.set(Some(share))
     };
+    let is_told = |due: f64| told.get().is_some_and(|share: f64| (share - due).abs() < 1e-9);
     metered(tell, || {
         // Nothing is told of files that nobody announced.
-        read(&files[0]);
-        assert!(told.borrow().is_empty());
-        will_read(&[files[0].path(), files[1].path(), Path::new("not there")], 2);
-        read(&files[1]);
+        read(&long);
+        assert_eq!(told.get(), None);
+        let whole = 300.0 + 3.0 * 300.0 + 100.0;
+        will_read(long.path(), &[1.0, 3.0]);
+        will_read(short.path(), &[1.0]);
+        will_read("not there", &[1.0]);
+        read(&long);
+        assert!(is_told(300.0 / whole), "{told:?}");
+        read(&long);
+        assert!(is_told(1200.0 / whole), "{told:?}");
+        read(&short);
+        assert!(is_told(1.0), "{told:?}");
     });
+    told.set(None);
     // After the job nothing counts.
-    read(&files[0]);
-    let told = told.borrow();
-    assert!(told.iter().all(|share| (share - 400.0 / 800.0).abs() < 1e-9), "{told:?}");
-    assert!(!told.is_empty());
+    read(&short);
+    assert_eq!(told.get(), None);
 }
 
 #[test]
@@ -41,13 +49,13 @@ fn a_job_that_panics_leaves_no_meter_behind() {
     let file = file(10);
     let job = || {
         metered(
-            |_| panic!("told"),
+            |_| (),
             || {
-                will_read(&[file.path()], 1);
+                will_read(file.path(), &[1.0]);
                 panic!("the job");
             },
-        )
+        );
     };
     panic::catch_unwind(panic::AssertUnwindSafe(job)).unwrap_err();
-    read(&file);
+    METER.with_borrow(|meter| assert!(meter.is_none()));
 }

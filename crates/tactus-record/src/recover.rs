@@ -80,7 +80,7 @@ impl fmt::Display for LastPress {
 pub fn recover(path: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<Recovery, RecordError> {
     let (path, out) = (path.as_ref(), out.as_ref());
     // To see what is intact, to copy it, and to read the copy again.
-    meter::will_read(&[path], 3);
+    meter::will_read(path, &[1.0, 1.0, 1.0]);
     let survey = Survey::of(path)?;
     if survey.completeness == Completeness::Complete && survey.tally.finished().is_some() {
         return Err(RecordError::NothingToRecover { path: path.to_owned() });

@@ -94,8 +94,8 @@ pub fn visit<P: AsRef<Path>>(
 /// Says what [`visit`] will read: recordings for the motion of the stage, then for the frames; tables once.
 fn announce<P: AsRef<Path>>(paths: &[P]) {
     for path in paths.iter().map(AsRef::as_ref) {
-        let times = if first_bytes(path).is_ok_and(|start| is_mcap(&start)) { 2 } else { 1 };
-        meter::will_read(&[path], times);
+        let is_recording = first_bytes(path).is_ok_and(|start| is_mcap(&start));
+        meter::will_read(path, if is_recording { &[1.0, 1.0] } else { &[1.0] });
     }
 }
 

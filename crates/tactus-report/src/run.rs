@@ -72,7 +72,7 @@ pub enum ReportError {
 /// [`RunReport::notes`].
 pub fn run_report(recording: &Path) -> Result<RunReport, ReportError> {
     // For the motion of the stage, then for the frames.
-    meter::will_read(&[recording], 2);
+    meter::will_read(recording, &[1.0, 1.0]);
     let timeline = Timeline::read(recording)?;
     let frames = FrameStatistics::read(recording, &timeline)?;
     let presses = Presses::of(&timeline, &frames);

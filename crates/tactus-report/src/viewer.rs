@@ -43,7 +43,7 @@ pub struct ViewerFile {
 pub fn viewer_file(recording: &Path, out: impl Into<PathBuf>) -> Result<ViewerFile, ReportError> {
     let out = out.into();
     // For the motion of the stage, for the greatest rise, then for all messages.
-    meter::will_read(&[recording], 3);
+    meter::will_read(recording, &[1.0, 1.0, 4.0]);
     let timeline = Timeline::read(recording)?;
     let part = with_suffix(&out, ".part");
     let written = write(recording, &timeline, &part);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use serde::{Deserialize, Serialize};
-use tactus_record::{Completeness, Info};
+use tactus_record::{Completeness, Info, meter};
 
 use crate::RunsError;
 
@@ -89,32 +89,37 @@ impl Index {
     pub(crate) fn renewed(&self, folder: &Path) -> Result<(Self, Vec<String>), RunsError> {
         let (mut files, mut unreadable) = (Vec::new(), Vec::new());
         search(folder, DEPTH_MAX, &mut files)?;
+        for file in files.iter().filter(|file| self.fresh(folder, file).is_none()) {
+            meter::will_read(file, &[1.0]);
+        }
         let mut now = Self { schema: SCHEMA.to_owned(), recordings: BTreeMap::new() };
         let mut is_news = false;
         for file in files {
-            let key = file.strip_prefix(folder).unwrap_or(&file).to_owned();
             let Some((bytes, modified_ns)) = state_of(&file) else { continue };
-            let known = self.recordings.get(&key);
-            let known =
-                known.filter(|known| (known.bytes, known.modified_ns) == (bytes, modified_ns)).cloned();
-            let known = if let Some(Known { entry, .. }) = known {
-                Known { bytes, modified_ns, entry: RunEntry { path: file, ..entry } }
+            let known = if let Some(Known { entry, .. }) = self.fresh(folder, &file).cloned() {
+                Known { bytes, modified_ns, entry: RunEntry { path: file.clone(), ..entry } }
             } else {
                 is_news = true;
                 match tactus_record::info(&file) {
-                    Ok(info) => Known { bytes, modified_ns, entry: RunEntry::of(file, info) },
+                    Ok(info) => Known { bytes, modified_ns, entry: RunEntry::of(file.clone(), info) },
                     Err(error) => {
                         unreadable.push(error.to_string());
                         continue;
                     }
                 }
             };
-            now.recordings.insert(key, known);
+            now.recordings.insert(key_of(folder, &file), known);
         }
         if is_news || now.recordings.len() != self.recordings.len() {
             keep(&folder.join(INDEX), &now);
         }
         Ok((now, unreadable))
+    }
+
+    /// What is known of a recording, if it has not changed since.
+    fn fresh(&self, folder: &Path, file: &Path) -> Option<&Known> {
+        let state = state_of(file)?;
+        self.recordings.get(&key_of(folder, file)).filter(|known| (known.bytes, known.modified_ns) == state)
     }
 
     /// The runs in the order of their start.
@@ -123,6 +128,10 @@ impl Index {
         entries.sort_by(|one, other| (&one.started, &one.run_id).cmp(&(&other.started, &other.run_id)));
         entries
     }
+}
+
+fn key_of(folder: &Path, file: &Path) -> PathBuf {
+    file.strip_prefix(folder).unwrap_or(file).to_owned()
 }
 
 /// Without it everything is read again, so a folder that cannot be written costs only time.

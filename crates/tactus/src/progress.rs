@@ -259,14 +259,12 @@ impl Busy {
     /// Does a job that reads files: see [`meter::will_read`].
     pub(crate) fn reads<T>(&self, job: impl FnOnce() -> T) -> T {
         let bar = self.0.clone();
-        let tell = move |share| {
-            // Only now, because not every job says what it will read.
-            if bar.position() == 0 {
-                styled(&bar, "{msg}  {bar:30.cyan/dim} {percent:>3} %  {left}");
-            }
-            set_share(&bar, share);
-        };
-        meter::metered(tell, job)
+        meter::metered(move |share| show_share(&bar, share), job)
+    }
+
+    /// Shows what share is done, 0 to 1, and how long the rest takes if it goes on so.
+    pub(crate) fn shows(&self, share: f64) {
+        show_share(&self.0, share);
     }
 
     /// Shows work that follows, with the time since the beginning.
@@ -274,6 +272,14 @@ impl Busy {
         styled(&self.0, "{msg}  {elapsed:>4}");
         self.0.set_message(what);
     }
+}
+
+fn show_share(bar: &ProgressBar, share: f64) {
+    // Only now, because not every job knows it.
+    if bar.position() == 0 {
+        styled(bar, "{msg}  {bar:30.cyan/dim} {percent:>3} %  {left}");
+    }
+    set_share(bar, share);
 }
 
 impl Drop for Busy {

@@ -8,15 +8,15 @@ use tactus_report::figures;
 use crate::cli::{Common, FiguresArgs};
 use crate::exit::Exit;
 use crate::output::{duration, say, say_next};
-use crate::progress::ComputationProgress;
+use crate::progress::Busy;
 
 pub(crate) fn figures(common: &Common, args: &FiguresArgs) -> anyhow::Result<Exit> {
     let start = Instant::now();
-    let progress = ComputationProgress::new(common.json);
+    let busy = Busy::with("drawing", common.json);
     let files = figures::draw_all(&args.out, |drawn| {
-        progress.show(drawn.title, drawn.finished as f64 / drawn.figures as f64);
+        busy.shows(drawn.finished as f64 / drawn.figures as f64);
     })?;
-    progress.clear();
+    drop(busy);
     if common.json {
         say(&json!({ "files": files, "simulated": true }).to_string());
         return Ok(Exit::Done);

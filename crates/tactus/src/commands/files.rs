@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use tactus_record::table::TableFormat;
-use tactus_record::{Completeness, Info};
+use tactus_record::{Completeness, Info, meter};
 use tactus_schema::pb;
 
 use crate::cli::{Common, ExportArgs, RecoverArgs, ReportArgs};
@@ -18,7 +18,7 @@ const CRASHED: &str = pb::ExitStatus::Crashed.word();
 
 pub(crate) fn info(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
     let [file] = files else { return Ok(infos(common, files)) };
-    let info = tactus_record::info(file)?;
+    let info = reading(common, files, || tactus_record::info(file))?;
     if common.json {
         println!("{}", serde_json::to_string(&info)?);
     } else {
@@ -28,11 +28,20 @@ pub(crate) fn info(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
     Ok(tell_lacks(file, &info))
 }
 
+/// Reads each of the files once.
+fn reading<T>(common: &Common, files: &[PathBuf], job: impl FnOnce() -> T) -> T {
+    Busy::with("reading", common.json).reads(|| {
+        files.iter().for_each(|file| meter::will_read(file, &[1.0]));
+        job()
+    })
+}
+
 /// A row for each recording. One that cannot be read does not hide the others.
 fn infos(common: &Common, files: &[PathBuf]) -> Exit {
     let (mut infos, mut unreadable, mut exit) = (Vec::new(), Vec::new(), Exit::Done);
-    for file in files {
-        match tactus_record::info(file) {
+    let read = || files.iter().map(|file| (file, tactus_record::info(file))).collect::<Vec<_>>();
+    for (file, info) in reading(common, files, read) {
+        match info {
             Ok(info) => {
                 if tell_lacks(file, &info) != Exit::Done && exit == Exit::Done {
                     exit = Exit::Degraded;

@@ -10,6 +10,7 @@ use super::run::{self, Subject};
 use crate::cli::{Common, LeaseArgs, RerunArgs, RunArgs, RunSubject, RunsArgs, RunsCommand};
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, print_fields, print_table, say};
+use crate::progress::Busy;
 
 pub(crate) fn runs(common: &Common, args: &RunsArgs) -> anyhow::Result<Exit> {
     let folder = &args.runs;
@@ -51,7 +52,9 @@ fn failure(error: RunsError) -> anyhow::Error {
 }
 
 fn list(common: &Common, args: &RunsArgs) -> anyhow::Result<Exit> {
-    let Runs { runs: mut all, unreadable } = RunsFolder::new(&args.runs).runs().map_err(failure)?;
+    let listed =
+        Busy::with("reading new recordings", common.json).reads(|| RunsFolder::new(&args.runs).runs());
+    let Runs { runs: mut all, unreadable } = listed.map_err(failure)?;
     for error in unreadable {
         eprintln!("tactus: {error}");
     }

@@ -14,6 +14,7 @@ use tactus_model::{Simulator, Trajectory};
 use super::scene::Scene;
 use crate::cli::{Common, SimulateArgs};
 use crate::exit::{Exit, Failure, in_words};
+use crate::progress::Busy;
 
 /// Limit of frames in one series: ten hours at 30 Hz.
 const FRAMES_MAX: f64 = 1_080_000.0;
@@ -48,7 +49,10 @@ pub(super) fn write(
         let names: Vec<_> = (0..scene.array().elements()).map(|element| format!("e{element}")).collect();
         writeln!(out, "t_s,x_mm,y_mm,z_mm,{}", names.join(","))?;
     }
-    for image in images {
+    // A terminal that gets the frames shows how far they are.
+    let busy = Busy::with("simulating", common.json || args.out.is_none());
+    for (done, image) in images.enumerate() {
+        busy.shows(done as f64 / f64::from(frames));
         let [x_mm, y_mm, z_mm] = trajectory.at(image.t_s);
         let counts = if args.noise { image.counts } else { image.clean_counts };
         if common.json {
@@ -62,6 +66,7 @@ pub(super) fn write(
         }
     }
     out.flush()?;
+    drop(busy);
     if let Some(path) = &args.out {
         eprintln!("{frames} frames of the simulated sensor in {}", path.display());
     }
