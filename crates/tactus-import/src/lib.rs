@@ -22,6 +22,7 @@ use std::{
 
 use serde::Serialize;
 use serde_json::json;
+use tactus_record::meter;
 use tactus_record::table::TableWriter;
 use tactus_schema::table::{Phase, RowView};
 
@@ -39,6 +40,9 @@ const METADATA_KEY: &str = "tactus.import";
 
 /// Name of that JSON's form.
 const METADATA_SCHEMA: &str = "tactus.import/1";
+
+/// Time to write a frame, in comparison with the time to read it.
+const WRITING: f64 = 1.0;
 
 /// The result of an import.
 #[derive(Debug, Clone, Serialize)]
@@ -97,6 +101,9 @@ pub fn import<P: AsRef<Path>>(
     let shape @ [rows, cols] = sketch.shape(map)?;
     let elements = mapping.counts.columns.of_array(rows, cols).map_err(|wrong| wrong.in_file(map))?;
     let (mut imported, mut warnings): (Vec<Run>, Vec<String>) = (Vec::new(), Vec::new());
+    for cost in [1.0, WRITING] {
+        files.iter().for_each(|path| meter::will_read(path, &[cost]));
+    }
     for path in files.iter().map(AsRef::as_ref) {
         let file = runs::of_file(&Columns::read(path, &mapping.form)?, &mapping, &elements)?;
         if file.left_out > 0 {
@@ -132,6 +139,8 @@ fn write<P: AsRef<Path>>(
         path: map.to_owned(),
         source,
     })?;
+    let bytes: u64 = files.iter().filter_map(|file| Some(fs::metadata(file).ok()?.len())).sum();
+    let frames: u64 = runs.iter().map(|run| run.t_ns.len() as u64).sum();
     let files: Vec<_> = files.iter().filter_map(|file| file.as_ref().file_name()?.to_str()).collect();
     let mut table = TableWriter::create(out, json)?;
     let made_of =
@@ -156,6 +165,7 @@ fn write<P: AsRef<Path>>(
                 table.abandon();
                 return Err(error.into());
             }
+            meter::count(bytes / frames.max(1));
         }
     }
     Ok(table.finish()?)

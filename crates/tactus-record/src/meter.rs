@@ -57,8 +57,8 @@ pub fn will_read(path: impl AsRef<Path>, costs: &[f64]) {
     });
 }
 
-/// Counts what was read.
-pub(crate) fn count(bytes: u64) {
+/// Counts what was read or, in a pass that reads what is in memory, the share of the file's bytes that it is at.
+pub fn count(bytes: u64) {
     with(|meter| meter.count(bytes));
 }
 
@@ -103,6 +103,16 @@ impl Drop for Outer {
 
 /// A file whose reading counts.
 pub struct MeteredFile(pub(crate) File);
+
+impl MeteredFile {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// As [`File::open`].
+    pub fn open(path: impl AsRef<Path>) -> io::Result<Self> {
+        File::open(path).map(Self)
+    }
+}
 
 impl Read for MeteredFile {
     fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {

@@ -9,8 +9,9 @@ mod ros;
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use mcap::{Channel, MessageStream};
+use mcap::{Channel, MessageStream, Summary};
 use serde_json::Value;
+use tactus_record::meter;
 
 use super::{Column, Columns, Places, file_error};
 use crate::{ImportError, mapping::FileForm};
@@ -48,10 +49,14 @@ pub(super) fn read(path: &Path, form: &FileForm) -> Result<Columns, ImportError>
     let bytes =
         fs::read(path).map_err(|source| ImportError::Io { action: "read", path: path.to_owned(), source })?;
     let broken = |error: mcap::McapError| file_error(path, error.to_string());
+    // An index that is missing or damaged costs only the progress.
+    let statistics = Summary::read(&bytes).ok().flatten().and_then(|summary| summary.stats);
+    let messages = statistics.map_or(0, |statistics| statistics.message_count);
     let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
     let mut left_out: BTreeMap<String, String> = BTreeMap::new();
     for message in MessageStream::new(&bytes).map_err(broken)? {
         let message = message.map_err(broken)?;
+        meter::count((bytes.len() as u64).checked_div(messages).unwrap_or(0));
         let name = &message.channel.topic;
         if left_out.contains_key(name) {
             continue;

@@ -5,6 +5,8 @@ mod archive;
 
 use std::{fs, path::Path};
 
+use tactus_record::meter;
+
 use super::{Column, Columns, Places, file_error};
 use crate::ImportError;
 
@@ -24,6 +26,7 @@ pub(super) fn read(path: &Path) -> Result<Columns, ImportError> {
         })?;
         arrays.push((name, array));
     }
+    meter::count(bytes.len() as u64);
     // Single values and lists of another length, such as settings, are no columns.
     let rows = arrays.iter().filter_map(|(_, array)| array.shape.first()).copied().max().unwrap_or(0);
     let columns = arrays.into_iter().filter(|(_, array)| array.shape.first() == Some(&rows));

@@ -3,18 +3,20 @@
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
+use tactus_record::meter::MeteredFile;
 
 use super::{Column, Columns, Places, file_error};
 use crate::{ImportError, mapping::FileForm};
 
 pub(super) fn read(path: &Path, form: &FileForm) -> Result<Columns, ImportError> {
     let failed = |error: csv::Error| file_error(path, error.to_string());
+    let file = MeteredFile::open(path);
+    let file = file.map_err(|source| ImportError::Io { action: "read", path: path.to_owned(), source })?;
     let mut reader = ReaderBuilder::new()
         .delimiter(form.delimiter)
         .comment(form.comment)
         .trim(Trim::All)
-        .from_path(path)
-        .map_err(failed)?;
+        .from_reader(file);
     let names: Vec<String> = reader
         .headers()
         .map_err(failed)?

@@ -17,7 +17,7 @@ pub(crate) fn import(common: &Common, args: &ImportArgs) -> anyhow::Result<Exit>
         (Some(map), None) => {
             let out = args.out.clone().unwrap_or_else(|| args.files[0].with_extension("parquet"));
             let busy = Busy::with("reading", common.json);
-            let summary = tactus_import::import(map, &args.files, out)?;
+            let summary = busy.reads(|| tactus_import::import(map, &args.files, out))?;
             drop(busy);
             Ok(told(common, &summary))
         }
