@@ -1,6 +1,6 @@
 //! The rig of a lab's file: what the mapping says of it, completed by what its readings show.
 
-use std::{fs, path::Path};
+use std::{collections::BTreeMap, fs, path::Path};
 
 use serde_json::{Map, Value, json};
 use tactus_schema::{Rig, rig::SCHEMA, table::Phase};
@@ -269,11 +269,15 @@ impl Readings<'_> {
     fn counts_per_mm(&self, baseline: &[f64]) -> Option<f64> {
         let mut slopes = Vec::new();
         for run in self.runs {
-            let presses = run.phases.iter().map(|(_, press)| *press).max().unwrap_or(-1);
-            for press in 0..=presses {
-                let frames = (0..run.t_ns.len()).filter(|frame| run.phases[*frame].1 == press);
-                let deepest = frames.min_by(|a, b| run.position_mm[*a][2].total_cmp(&run.position_mm[*b][2]));
-                let Some(frame) = deepest.filter(|frame| run.position_mm[*frame][2] < 0.0) else { continue };
+            let mut deepest: BTreeMap<i32, usize> = BTreeMap::new();
+            let pressed = |frame: &usize| run.phases[*frame].1 >= 0 && run.position_mm[*frame][2] < 0.0;
+            for frame in (0..run.t_ns.len()).filter(pressed) {
+                let known = deepest.entry(run.phases[frame].1).or_insert(frame);
+                if run.position_mm[frame][2] < run.position_mm[*known][2] {
+                    *known = frame;
+                }
+            }
+            for frame in deepest.into_values() {
                 let counts = &run.counts[frame * self.elements..(frame + 1) * self.elements];
                 let changes = counts.iter().zip(baseline).map(|(count, rest)| f64::from(*count) - rest);
                 let greatest = changes.max_by(|a, b| a.abs().total_cmp(&b.abs()));
