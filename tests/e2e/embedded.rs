@@ -255,6 +255,8 @@ fn a_person_sees_how_far_a_dry_run_a_run_and_a_study_are() {
     let start = |args: &[&str]| Terminal::start("tactus", folder.path(), args, [120, 30]);
     let mut planned = start(&["plan", "grid-sweep", "--embedded"]);
     planned.wait_for(&["dry run ", " presses so far"]);
+    // A script that nobody has run before: its steps say how long it takes.
+    planned.wait_for(&["dry run ", " %", " left"]);
     drop(planned);
     let mut run = start(&["run", "element-centres", "--embedded"]);
     run.wait_for(&["dry run "]);

@@ -5,7 +5,7 @@ use std::fs;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rustix::process::Signal;
-use tactus_e2e::{ServiceUnderTest, binary, tactus};
+use tactus_e2e::{ServiceUnderTest, Terminal, binary, tactus};
 use tactus_plan::{
     Arguments, Call, Evaluate, Exceeded, Host, Refusal, Reply, RigView, Script, ScriptError, ScriptLimits,
     Step,
@@ -143,6 +143,22 @@ fn a_service_refuses_bombs_and_stays_as_it_was() {
     assert_eq!(runs.count(), 0, "nothing was run");
     let script = lab.script("good.star", "def run(rig):\n    tare()\n");
     assert_eq!(lab.tactus(&["--json", "run", &script, "--no-report"]).code, Some(0));
+}
+
+#[test]
+fn everybody_sees_how_far_the_dry_run_of_a_service_is() {
+    let lab = ServiceUnderTest::start(|rig| rig);
+    let script = lab.script("long.star", LONG);
+    let phase = || lab.tactus(&["status", "--json"]).json()["run"]["phase"].clone();
+    assert_eq!(phase(), "idle");
+    let args = ["--endpoint", &lab.endpoint, "run", &script, "--no-report"];
+    let mut client = Terminal::start("tactus", lab.folder.path(), &args, [100, 24]);
+    client.wait_for(&["dry run ", " %", " left"]);
+    assert_eq!(phase(), "preparing");
+    assert_eq!(lab.tactus(&["stop", "--reason", "enough"]).code, Some(0));
+    client.wait_for(&["enough"]);
+    // There was no run.
+    assert_eq!(phase(), "idle");
 }
 
 /// A long dry run whose script never thinks for long.

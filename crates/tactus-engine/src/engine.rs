@@ -298,7 +298,11 @@ impl Engine {
             free
         });
         if taken {
-            Ok(Claim(Arc::clone(&self.shared), Arc::clone(&self.acquisition)))
+            Ok(Claim {
+                shared: Arc::clone(&self.shared),
+                acquisition: Arc::clone(&self.acquisition),
+                before: Mutex::default(),
+            })
         } else {
             Err(Busy { run_id: self.run_id() })
         }
@@ -582,11 +586,13 @@ impl Shared {
 
 /// The exclusive right to run. Dropping it gives it back.
 #[must_use = "the right is given back when this is dropped"]
-pub struct Claim(
-    Arc<Shared>,
+pub struct Claim {
+    shared: Arc<Shared>,
     #[expect(dead_code, reason = "a run keeps the acquisition alive, whoever drops the engine")]
-    Arc<AcquisitionTask>,
-);
+    acquisition: Arc<AcquisitionTask>,
+    /// What was told before the preparation of a run was, which holds again if there is no run.
+    before: Mutex<Option<pb::RunState>>,
+}
 
 impl fmt::Debug for Claim {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -602,7 +608,8 @@ impl Claim {
         let span = info_span!("run", run_id, experiment, exit_status = field::Empty, presses = field::Empty);
         // A task of its own, watched by another: neither a panic of the run nor an impatient caller leaves the tip.
         let run = async move {
-            let shared = Arc::clone(&self.0);
+            let shared = Arc::clone(&self.shared);
+            self.before().take();
             let run = tokio::spawn(Run::execute(Arc::clone(&shared), order.clone(), record).instrument(span));
             let outcome = match run.await {
                 Ok(outcome) => outcome,
@@ -618,7 +625,7 @@ impl Claim {
     /// Gives the right back and tells that the run is finished. Whoever is told can begin the next run, and nothing of that
     /// one is told before: its first state waits for this one.
     fn finish(self, outcome: &RunOutcome) {
-        let shared = Arc::clone(&self.0);
+        let shared = Arc::clone(&self.shared);
         shared.state.send_modify(|state| {
             drop(self);
             state.phase = pb::RunPhase::Finished.into();
@@ -637,12 +644,42 @@ impl Claim {
     /// # Errors
     /// [`Stopped`], with the reason.
     pub fn check(&self) -> Result<(), Stopped> {
-        self.0.check_ended().map_err(|ended| Stopped { reason: ended.to_string() })
+        self.shared.check_ended().map_err(|ended| Stopped { reason: ended.to_string() })
+    }
+
+    /// Tells how far the preparation of a run is: `presses` of its dry run, and the wall-clock time so far and left.
+    pub fn prepares(&self, run_id: &str, experiment: &str, presses: u32, [elapsed_s, remaining_s]: [f64; 2]) {
+        let shared = &self.shared;
+        let preparing = pb::RunState {
+            run_id: run_id.to_owned(),
+            experiment: experiment.to_owned(),
+            phase: pb::RunPhase::Preparing.into(),
+            presses,
+            elapsed_s,
+            remaining_s,
+            message: "dry run".into(),
+            simulated: shared.rig.simulated,
+            t_mono_ns: shared.clock.now().mono.ns(),
+            fault: shared.fault_text(),
+            ..pb::RunState::default()
+        };
+        let told = shared.state.send_replace(preparing);
+        self.before().get_or_insert(told);
+        shared.publish.state(&shared.state.borrow());
+    }
+
+    fn before(&self) -> MutexGuard<'_, Option<pb::RunState>> {
+        self.before.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Drop for Claim {
     fn drop(&mut self) {
-        self.0.control.send_modify(|control| control.claimed = false);
+        let before = self.before().take();
+        if let Some(before) = before {
+            self.shared.state.send_replace(before);
+            self.shared.publish.state(&self.shared.state.borrow());
+        }
+        self.shared.control.send_modify(|control| control.claimed = false);
     }
 }

@@ -6,7 +6,7 @@ use std::io::{self, Read as _};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tactus_bus::{CommandCall, Publisher, Request};
 use tactus_engine::{Engine, ResetError, ResumeError, RunOrder, StopOrder};
@@ -16,7 +16,7 @@ use tactus_runner::continuation::{self, ContinuationError, Wish};
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::recorder::{Gauge, ThreadRecorder};
 use tactus_runner::script_process::ScriptProcesses;
-use tactus_runner::twin::DryRun;
+use tactus_runner::twin::{Attend, DryRun, SoFar};
 use tactus_runner::{experiments, twin};
 use tactus_schema::key::Command;
 use tactus_schema::{MonoTime, Rig, WallTime, pb};
@@ -342,7 +342,15 @@ impl CommandDesk {
         let span = info_span!("dry run");
         let prepare = move || {
             let _entered = span.entered();
-            let prepared = prepare(wanted, &twin_rig, now, &|| claim.check().is_err());
+            let began = Instant::now();
+            let tell = |order: &RunOrder, so_far: SoFar| {
+                // Most dry runs are over before anybody could wonder.
+                let Some(share) = so_far.share.filter(|share| *share > 0.0) else { return };
+                let elapsed_s = began.elapsed().as_secs_f64();
+                let times_s = [elapsed_s, elapsed_s * (1.0 - share) / share];
+                claim.prepares(&order.run_id, order.script.name(), so_far.presses, times_s);
+            };
+            let prepared = prepare(wanted, &twin_rig, now, &|| claim.check().is_err(), &tell);
             (claim, prepared)
         };
         let (claim, prepared) = tokio::task::spawn_blocking(prepare).await.map_err(Refusal::failed)?;
@@ -398,7 +406,8 @@ impl CommandDesk {
         let depth_max_mm = rig.depth_max_mm().unwrap_or_default();
         let prepare = {
             let is_old = is_old.clone();
-            move || prepare(wanted, &rig, now, &is_old)
+            // Who asks waits for the answer alone.
+            move || prepare(wanted, &rig, now, &is_old, &|_, _| ())
         };
         let prepared = tokio::task::spawn_blocking(prepare).await.map_err(Refusal::failed)?;
         if is_old() {
@@ -492,12 +501,30 @@ fn new_secret() -> Result<Secret, Refusal> {
         .map_err(|error: io::Error| Refusal::failed(format!("the system gives no random numbers: {error}")))
 }
 
+/// Who waits for the dry run of an order.
+struct Preparation<'a> {
+    order: &'a RunOrder,
+    stopped: &'a dyn Fn() -> bool,
+    tell: &'a dyn Fn(&RunOrder, SoFar),
+}
+
+impl Attend for Preparation<'_> {
+    fn stops(&self) -> bool {
+        (self.stopped)()
+    }
+
+    fn sees(&self, so_far: SoFar) {
+        (self.tell)(self.order, so_far);
+    }
+}
+
 /// Reads the earlier run if there is one, checks the parameters and makes the dry run, until `stopped`.
 fn prepare(
     wanted: Wanted,
     rig: &Rig,
     now: WallTime,
     stopped: &dyn Fn() -> bool,
+    tell: &dyn Fn(&RunOrder, SoFar),
 ) -> Result<Prepared, Refusal> {
     let (request, note) = match wanted {
         Wanted::Experiment(request) => (*request, None),
@@ -512,7 +539,8 @@ fn prepare(
     };
     info!(who = request.who, "the dry run begins");
     let order = order::order(request, rig, now, stopped).map_err(Refusal::usage)?;
-    let plan = twin::dry_run(rig, order.clone(), &stopped).map_err(Refusal::failed)?;
+    let preparation = Preparation { order: &order, stopped, tell };
+    let plan = twin::dry_run(rig, order.clone(), &preparation).map_err(Refusal::failed)?;
     if let Some(note) = &note {
         info!("{note}");
     }

@@ -32,7 +32,18 @@ pub(super) async fn run(
     let rehearsing = told.progress();
     rehearsing.rehearse(SoFar { presses: 0, share: None });
     let request = pb::RunRequest { who: args.who.clone(), lease: held.secret(), ..request_of(subject) };
-    let reply = connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await;
+    // Its own subscription, so that no state of the run is taken from the other one.
+    let mut preparing = client.subscribe::<RunState>(History::None).await?;
+    let asking = connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE);
+    tokio::pin!(asking);
+    let reply = loop {
+        tokio::select! {
+            reply = &mut asking => break reply,
+            Some(state) = preparing.recv() => if state.phase() == RunPhase::Preparing {
+                rehearsing.rehearse(so_far(&state));
+            },
+        }
+    };
     rehearsing.clear();
     let reply = match reply {
         Ok(reply) => reply,
@@ -123,4 +134,11 @@ fn request_of(subject: Subject) -> pb::RunRequest {
         },
         Subject::Rest(run_id) => pb::RunRequest { continue_run: run_id, ..Default::default() },
     }
+}
+
+/// How far the service's dry run is.
+fn so_far(state: &RunState) -> SoFar {
+    let whole_s = state.elapsed_s + state.remaining_s;
+    let share = (state.remaining_s >= 0.0 && whole_s > 0.0).then(|| state.elapsed_s / whole_s);
+    SoFar { presses: state.presses, share }
 }
