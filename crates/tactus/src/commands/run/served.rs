@@ -14,6 +14,7 @@ use super::{RunSummary, Subject, Told, taken_over_in_words};
 use crate::cli::RunArgs;
 use crate::connection::{self, PATIENCE};
 use crate::exit::in_words;
+use crate::progress::RunProgress;
 
 /// How long the dry run may take before the service answers.
 const DRY_RUN_PATIENCE: Duration = Duration::from_mins(5);
@@ -32,18 +33,7 @@ pub(super) async fn run(
     let rehearsing = told.progress();
     rehearsing.rehearse(SoFar { presses: 0, share: None });
     let request = pb::RunRequest { who: args.who.clone(), lease: held.secret(), ..request_of(subject) };
-    // Its own subscription, so that no state of the run is taken from the other one.
-    let mut preparing = client.subscribe::<RunState>(History::None).await?;
-    let asking = connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE);
-    tokio::pin!(asking);
-    let reply = loop {
-        tokio::select! {
-            reply = &mut asking => break reply,
-            Some(state) = preparing.recv() => if state.phase() == RunPhase::Preparing {
-                rehearsing.rehearse(so_far(&state));
-            },
-        }
-    };
+    let reply = ask(&client, &request, &rehearsing).await;
     rehearsing.clear();
     let reply = match reply {
         Ok(reply) => reply,
@@ -133,6 +123,26 @@ fn request_of(subject: Subject) -> pb::RunRequest {
             ..Default::default()
         },
         Subject::Rest(run_id) => pb::RunRequest { continue_run: run_id, ..Default::default() },
+    }
+}
+
+/// Asks for the run, and shows how far its dry run is until the service answers.
+async fn ask(
+    client: &Client,
+    request: &pb::RunRequest,
+    rehearsing: &RunProgress,
+) -> anyhow::Result<pb::CommandReply> {
+    // Its own subscription, so that no state of the run is taken from the other one.
+    let mut preparing = client.subscribe::<RunState>(History::None).await?;
+    let asking = connection::ask(client, Command::Run, request, DRY_RUN_PATIENCE);
+    tokio::pin!(asking);
+    loop {
+        tokio::select! {
+            reply = &mut asking => return reply,
+            Some(state) = preparing.recv() => if state.phase() == RunPhase::Preparing {
+                rehearsing.rehearse(so_far(&state));
+            },
+        }
     }
 }
 
