@@ -91,6 +91,11 @@ impl Places {
         ["sets", "residuals"].map(|folder| self.work.join(folder).join(format!("{id}.parquet")))
     }
 
+    /// When each stage of a set's discovery began.
+    pub fn stages(&self, id: &str) -> PathBuf {
+        self.work.join("stages").join(format!("{id}.jsonl"))
+    }
+
     /// The label of a set.
     pub fn label(&self, id: &str) -> PathBuf {
         self.labels.join(format!("{id}.json"))
@@ -164,10 +169,10 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
     made.write(&table).with_context(|| at(&table))?;
     drop(made);
     let out = folder.join("out");
-    let log = folder.join("log");
+    let [log, stages] = ["log", "stages"].map(|name| folder.join(name));
     let mut discover = Command::new(&workflow.tactus);
     discover.args(["--json", "discover", "--threads", "1", "--seed"]).arg(DISCOVERY_SEED.to_string());
-    discover.args(&workflow.more).arg("--out").arg(&out).arg(&table);
+    discover.arg("--stages").arg(&stages).args(&workflow.more).arg("--out").arg(&out).arg(&table);
     // No effects of the lab take part.
     discover.env("XDG_STATE_HOME", &folder).env_remove("STATE_DIRECTORY");
     discover.stdout(Stdio::null()).stderr(File::create(&log).with_context(|| at(&log))?);
@@ -181,6 +186,7 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
     let found = out.join("report.json");
     let said = if found.exists() {
         moved(&found, &places.report(&set.id))?;
+        moved(&stages, &places.stages(&set.id))?;
         if workflow.keeps_tables {
             let [kept_table, residuals] = places.tables(&set.id);
             moved(&table, &kept_table)?;

@@ -1,7 +1,5 @@
 //! The protocol: recalibrate the base model, test for structure, locate it, name the effect, add it, and repeat.
 
-use std::sync::{Mutex, PoisonError};
-
 use rayon::ThreadPoolBuilder;
 use tactus_model::Effect;
 use tactus_model::effect::Definition;
@@ -9,19 +7,11 @@ use tactus_model::effect::Definition;
 use crate::data::{Bins, DiscoverError, Floor, Frames, Known};
 use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
 use crate::next::Experiments;
+use crate::progress::{Progress, Reporter, Stage};
 use crate::search::{Candidate, Formed, Grown, Memory, Options, Rule, Search, not_shown};
 use crate::verdict::{
     BaseModel, Confirmation, Discovery, SearchOutcome, cannot_judge, conclude, confirmation, confirmed,
 };
-
-/// Progress of a discovery.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Progress {
-    /// The current activity, such as `round 2: fitting hysteresis`.
-    pub what: String,
-    /// Estimated share that is done, 0 to 1; never falls.
-    pub share: f64,
-}
 
 /// Finds which effects a model lacks, by the whole protocol. Next experiments are chosen from those of the rig.
 ///
@@ -49,15 +39,16 @@ fn discover_on_threads(
     experiments: &dyn Experiments,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Discovery, DiscoverError> {
-    let reporter = ProgressReport { progress, share: Mutex::new(0.0) };
-    reporter.report("recalibrating the base model", 0.02);
+    let reporter = Reporter::new(progress);
+    reporter.enter(Stage::Base, "recalibrating the base model");
     let prepared = Prepared::new(known, frames, options.seed)?;
     if prepared.floor == Floor::None {
+        reporter.enter(Stage::Planning, "planning what to measure next");
         return cannot_judge(&prepared, options, experiments);
     }
     let problem = prepared.problem();
     let base = prepared.base.clone();
-    reporter.report("scoring the effects", 0.06);
+    reporter.enter(Stage::Locating, "locating where data and base model disagree");
     let lacking = not_shown::lacking(&problem, prepared.replicates);
     let mut candidates = Candidate::all(&problem, &base, &prepared.frequencies_hz)?;
     candidates.retain(|one| lacking.iter().all(|lacking| lacking.effect != one.definition.name));
@@ -68,7 +59,7 @@ fn discover_on_threads(
         known_terms: known.effects.len() + prepared.faulty.effects.len(),
         rounds: prepared.lattice.is_some(),
         memory: Memory::default(),
-        progress: &|what, share| reporter.report(what, share),
+        reporter: &reporter,
     };
     let before = search.locate(&base)?;
     let scattered = search.scattered(&base)?;
@@ -83,12 +74,11 @@ fn discover_on_threads(
     let (formed, mut contests) = search.contested(formed, &mut equivalent)?;
     contests.extend(refused);
     let confirmed = confirmed(&prepared, &search, formed, &mut equivalent)?;
-    reporter.report("locating what remains", 0.9);
+    reporter.enter(Stage::LocatingLeft, "locating what remains");
     let left = search.left(&confirmed.grown)?;
     let after = search.locate(&confirmed.grown)?;
     let scatters = [scattered, search.scattered(&confirmed.grown)?];
-    reporter.report("planning what to measure next", 0.95);
-    let told = conclude(
+    conclude(
         &prepared,
         &search,
         SearchOutcome {
@@ -106,9 +96,7 @@ fn discover_on_threads(
         },
         options,
         experiments,
-    )?;
-    reporter.report("done", 1.0);
-    Ok(told)
+    )
 }
 
 /// Compares a draft with new data: how strong it is there, and how much it closes of what a model leaves without it. The model's effects are
@@ -148,19 +136,4 @@ pub fn predict(
     #[expect(clippy::cast_possible_truncation, reason = "counts are stored in single precision")]
     let single = predicted.into_iter().map(|counts| counts as f32).collect();
     Ok(single)
-}
-
-/// Reports progress; the share never falls.
-struct ProgressReport<'a> {
-    progress: &'a (dyn Fn(Progress) + Sync),
-    share: Mutex<f64>,
-}
-
-impl ProgressReport<'_> {
-    fn report(&self, what: &str, share: f64) {
-        let mut held = self.share.lock().unwrap_or_else(PoisonError::into_inner);
-        // An activity without a share of its own advances by a hundredth of the remainder.
-        *held = if share > 0.0 { held.max(share) } else { *held + 0.01 * (1.0 - *held) };
-        (self.progress)(Progress { what: what.to_owned(), share: *held });
-    }
 }

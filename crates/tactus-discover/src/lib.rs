@@ -1,7 +1,7 @@
 //! Finds what a simulation is missing: where its predictions and measured frames disagree, which effect of the library
 //! explains the difference, and how far the gap shrinks with that effect added to the model.
 //!
-//! Each module uses only those before it: `numbers`, `data`, `fit`, `search`, `next`, `verdict`, `discover`. A test holds this:
+//! Each module uses only those before it: `numbers`, `progress`, `data`, `fit`, `search`, `next`, `verdict`, `discover`. A test holds this:
 //! `xtask/tests/it/modules.rs`.
 
 mod data;
@@ -11,15 +11,17 @@ mod fit;
 mod fixtures;
 mod next;
 mod numbers;
+mod progress;
 mod search;
 mod verdict;
 
 pub use data::{DiscoverError, Floor, Frames, Known};
-pub use discover::{Progress, confirm, discover, predict};
+pub use discover::{confirm, discover, predict};
 pub use fit::RunWalks;
 pub use next::{
     Experiments, LeftOut, NextExperiment, OpenQuestion, Plan, Rehearsal, RehearsalOrder, WORTH_Z,
 };
+pub use progress::{Progress, Stage};
 pub use search::{
     Because, Contest, Curve, Gap, GivenUp, NoDraft, NotShown, Options, Point, RefutedFormula, Rivalry, Round,
     Rule, TriedEffect,

@@ -566,6 +566,9 @@ pub(crate) struct DiscoverArgs {
     /// Use another method, for comparison.
     #[arg(long, hide = true, value_name = "WAY")]
     pub(crate) ablation: Option<Ablation>,
+    /// Write when each stage began, as JSON lines: the table of the time left is made from these.
+    #[arg(long, hide = true, value_name = "FILE")]
+    pub(crate) stages: Option<PathBuf>,
 }
 
 /// Another method to find effects; `docs/discovery-evidence.md` compares it with the default.

@@ -21,9 +21,10 @@
 
 use super::forms::Formed;
 use super::given_up::{Because, GivenUp};
-use super::grow::{Equivalent, LN_ODDS_LEAST, POLISH_ROUNDS, SHARE_AFTER_HOLD, Search, names, without};
+use super::grow::{Equivalent, LN_ODDS_LEAST, POLISH_ROUNDS, Search, names, without};
 use super::varying::varying_effect;
 use crate::data::DiscoverError;
+use crate::progress::Stage;
 
 /// A rival acts like a class if it would take over more than this share.
 const TAKEN_SHARE: f64 = 0.3;
@@ -104,7 +105,7 @@ impl Search<'_> {
         if names.is_empty() {
             return Ok((formed, Vec::new()));
         }
-        (self.progress)("comparing the names with what has none", SHARE_AFTER_HOLD);
+        self.reporter.enter(Stage::Contests, "comparing the names with what has none");
         let pass = self.pass(&formed.at)?;
         let contest = |effect: &'static str| {
             let (alike, beside) = (equivalent.get(effect)?, pass.beside(effect));

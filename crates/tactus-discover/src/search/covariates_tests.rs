@@ -4,6 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::Gap;
 use crate::fit::Prepared;
 use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
+use crate::progress::Reporter;
 use crate::search::Memory;
 use crate::search::grow::{ALPHA, Search};
 
@@ -31,7 +32,7 @@ fn gap(more: impl Fn(&[f64], f64) -> Vec<f64>) -> Vec<Gap> {
         known_terms: 0,
         rounds: false,
         memory: Memory::default(),
-        progress: &|_, _| {},
+        reporter: &Reporter::new(&|_| {}),
     };
     let located = search.locate(&prepared.base).unwrap();
     assert!(located.p_value <= ALPHA, "{}", located.p_value);

@@ -31,6 +31,7 @@ use super::score::{Score, flipped, largest, p_value};
 use crate::data::DiscoverError;
 use crate::fit::{Fitted, Free, Grams, Term};
 use crate::numbers::parallel;
+use crate::progress::Stage;
 
 /// Atoms that are weighed by their evidence.
 const WEIGHED_MAX: usize = 12;
@@ -165,7 +166,7 @@ impl Search<'_> {
     /// were not in the grammar.
     pub(crate) fn draft(&self, at: &Fitted, name: &str) -> Result<Outcome, DiscoverError> {
         let sight = Arc::new(Sight::of(self.problem, at)?);
-        (self.progress)("drafting what nobody has named", 0.0);
+        self.reporter.enter(Stage::Drafting, "drafting what nobody has named");
         let atoms = grammar::atoms(self.problem, at, &sight, self.rounds);
         let (p_value, first) = self.screened(at, &sight, &atoms)?;
         if p_value > ALPHA {

@@ -19,6 +19,7 @@ use tactus_model::effect::{CurveKind, Knots};
 use super::grow::{Equivalent, POLISH_ROUNDS, Search, names};
 use crate::data::DiscoverError;
 use crate::fit::{Fitted, Parameters, Term, of_formulas, places, undone};
+use crate::progress::Stage;
 
 /// So many standard deviations of a gain by chance.
 const REFUTED_Z: f64 = 2.0;
@@ -52,6 +53,7 @@ impl Search<'_> {
     /// explains.
     pub(crate) fn formed(&self, grown: Fitted, equivalent: &Equivalent) -> Result<Formed, DiscoverError> {
         let mut formed = Formed::from(grown);
+        self.reporter.enter(Stage::Forms, "fitting the names in other forms");
         for name in names(&formed.at.parameters, self.known_terms) {
             let has_knots = self.added(&formed.at, name).any(|term| term.knots.is_some());
             let formula = if has_knots {
@@ -96,7 +98,7 @@ impl Search<'_> {
 
     /// A model with knots, fitted, in place of all added terms of a class.
     fn with_knots(&self, at: &Fitted, name: &str, knots: &Knots) -> Result<Fitted, DiscoverError> {
-        (self.progress)(&format!("fitting {name} with knots"), 0.0);
+        self.reporter.tell(&format!("fitting {name} with knots"));
         let terms =
             self.added(at, name).take(1).map(|term| Term { knots: Some(knots.clone()), ..term.clone() });
         self.problem.fit_from(self.replaced(at, name, terms.collect()), POLISH_ROUNDS)
@@ -115,7 +117,7 @@ impl Search<'_> {
         name: &str,
         equivalent: &Equivalent,
     ) -> Result<Option<Fitted>, DiscoverError> {
-        (self.progress)(&format!("fitting the formula of {name}"), 0.0);
+        self.reporter.tell(&format!("fitting the formula of {name}"));
         let Some(alike) = equivalent.get(name) else { return Ok(None) };
         let Some(start) = self.formula_start(&*self.pass(&alike.without)?, name) else { return Ok(None) };
         self.problem.fit_from(self.replaced(at, name, vec![start]), POLISH_ROUNDS).map(Some)

@@ -25,6 +25,7 @@ use super::varying::varying_effect;
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, Parameters, Problem, RANDOM_WALK, Term};
 use crate::numbers::parallel;
+use crate::progress::{Reporter, Stage};
 
 /// A round of the search.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,8 +81,6 @@ const LEFT_SHARE: f64 = 1.0 / 3.0;
 /// A class with less than this share of the strongest one's odds may be an error of that one's form. From tuning sets: 95 % of the wrong
 /// classes beside a right one are within it (`just discovery-constants`).
 pub(super) const FORM_SHARE: f64 = 0.07;
-/// Estimated share of a discovery that is done when the classes have held their places.
-pub(super) const SHARE_AFTER_HOLD: f64 = 0.85;
 
 /// Data, candidates and options of a search.
 pub(crate) struct Search<'a> {
@@ -93,8 +92,7 @@ pub(crate) struct Search<'a> {
     /// True if the steps of the converter are wider than declared.
     pub(crate) rounds: bool,
     pub(crate) memory: Memory,
-    /// Is told what is done, and the share of the whole discovery that is done then.
-    pub(crate) progress: &'a (dyn Fn(&str, f64) + Sync),
+    pub(crate) reporter: &'a Reporter<'a>,
 }
 
 /// For each added effect, the others that explain the data as well in its place.
@@ -196,14 +194,16 @@ impl Search<'_> {
         let mut strongest = 0.0_f64;
         loop {
             let index = grown.rounds.len();
-            (self.progress)(&format!("round {}: scoring the effects", index + 1), share_before(index));
+            let count = names(&grown.at.parameters, self.known_terms).len();
+            let round = index + 1;
+            self.reporter.enter(Stage::Scoring { names: count }, &format!("round {round}: scoring the effects"));
             let pass = self.pass(&grown.at)?;
             let mut tried = self.tested(&pass, &grown.at, index);
-            let is_full =
-                names(&grown.at.parameters, self.known_terms).len() >= NAMES_MAX || index >= 2 * NAMES_MAX;
+            let is_full = count >= NAMES_MAX || index >= 2 * NAMES_MAX;
             // What is small beside the gain of another class may be an error of that one's form.
             let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
             let (fits, refused) = if 2.0 * tried.p_value <= ALPHA && !is_full {
+                self.reporter.enter(Stage::Fitting { names: count }, &format!("round {round}: fitting effects"));
                 self.next(grown, &pass, least)?
             } else {
                 (Vec::new(), None)
@@ -424,7 +424,7 @@ impl Search<'_> {
     ) -> Result<Vec<Beside>, DiscoverError> {
         let present = names(&at.parameters, self.known_terms);
         let fit = |(name, terms): &(&'static str, Vec<Term>)| {
-            (self.progress)(&format!("fitting {name}"), 0.0);
+            self.reporter.tell(&format!("fitting {name}"));
             let mut started = at.parameters.clone();
             started.terms.extend(terms.iter().cloned());
             let fitted = self.problem.fit_from(started, FIRST_ROUNDS)?;
@@ -517,11 +517,6 @@ impl Search<'_> {
     pub(super) fn left_over(&self, at: &Fitted) -> f64 {
         (at.cost - self.problem.readings()).max(0.0) / (2.0 * self.problem.variance)
     }
-}
-
-/// Estimated share of a discovery that is done before a round, the first being 0. Nobody knows how many will follow.
-fn share_before(round: usize) -> f64 {
-    1.0 - 0.9 * 0.7_f64.powf(round as f64)
 }
 
 /// True if an effect has the same form in reality as in the library: wiring is right or wrong.

@@ -5,14 +5,14 @@ use super::contests::Contest;
 use super::evidence::Set;
 use super::given_up::{Because, GivenUp};
 use super::grow::{
-    ALPHA, Alike, Beside, FORM_SHARE, Grown, LN_ODDS_LEAST, POLISH_ROUNDS, PROMISE_SHARE, SHARE_AFTER_HOLD,
-    Search, TRIAL_ROUNDS, is_exact, names, without,
+    ALPHA, Alike, Beside, FORM_SHARE, Grown, LN_ODDS_LEAST, POLISH_ROUNDS, PROMISE_SHARE, Search, TRIAL_ROUNDS, is_exact, names, without,
 };
 use super::pass::{Pass, rivals_win};
 use super::varying::varying_effect;
 use crate::data::DiscoverError;
 use crate::fit::{Fitted, Parameters, Term};
 use crate::numbers::parallel;
+use crate::progress::Stage;
 
 /// Another class takes the place of one if its odds are greater by this logarithm.
 const BETTER_LN_ODDS: f64 = 3.0;
@@ -24,8 +24,6 @@ const BLOCKS_Z: f64 = 2.0;
 /// Probability of a reported set of classes, and by how many units one at its end is behind the best.
 const SET_PROBABILITY: f64 = 0.95;
 const SET_UNITS: f64 = 3.0;
-/// Estimated share of a discovery that is done before the classes have to hold their places.
-const SHARE_BEFORE_HOLD: f64 = 0.65;
 
 impl Search<'_> {
     /// Lets each class hold its place: against the model without it, rivals without a name, and other classes.
@@ -36,8 +34,9 @@ impl Search<'_> {
             let mut leaves: Option<bool> = None;
             grown.equivalent.clear();
             let names = names(&grown.at.parameters, self.known_terms);
+            self.reporter.enter(Stage::Withdrawing { names: names.len() }, "withdrawing each name");
             let without = |name: &&'static str| {
-                (self.progress)(&format!("without {name}"), SHARE_BEFORE_HOLD);
+                self.reporter.tell(&format!("without {name}"));
                 let less = without(&grown.at.parameters, name, self.known_terms);
                 self.fitted(grown, less, TRIAL_ROUNDS)
             };
@@ -53,10 +52,9 @@ impl Search<'_> {
                 continue 'again;
             }
             for (nth, ((name, less), ln_odds)) in names.iter().zip(lesses).zip(odds.clone()).enumerate() {
-                let share = nth as f64 / names.len() as f64;
-                (self.progress)(
+                self.reporter.enter(
+                    Stage::Comparing { left: names.len() - nth },
                     &format!("comparing {name} with others in its place"),
-                    SHARE_BEFORE_HOLD + share * (SHARE_AFTER_HOLD - SHARE_BEFORE_HOLD),
                 );
                 let pass = self.pass(&less)?;
                 let (strength, mut rivals) = pass.rivalry(name, ln_odds);

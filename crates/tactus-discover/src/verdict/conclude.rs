@@ -15,6 +15,7 @@ use super::held_out::{HeldOutResidual, SEEN_NOISE, closed_share};
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, FoldsOf, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
+use crate::progress::Stage;
 use crate::search::{
     ALPHA, Alike, Because, Contest, Equivalent, FLIPS, Formed, GivenUp, Left, Located, NoDraft, NotShown,
     Options, POLISH_ROUNDS, Refuted, RefutedFormula, Round, Rule, Scattered, Search, Tried, last_words,
@@ -83,6 +84,7 @@ pub(crate) fn confirmed(
     let Formed { at: grown, refuted } = formed;
     let with_silent = prepared.problem_with_silent();
     let names = names(&grown.parameters, search.known_terms);
+    search.reporter.enter(Stage::Confirming { names: names.len() }, "confirming the names on folds of presses");
     let steps = search.steps(&grown, equivalent, &refuted, &with_silent)?;
     // A miswired element acts on its own readings, of which a fold may have none.
     let is_firm = |step: &Step| {
@@ -129,6 +131,7 @@ pub(crate) fn conclude(
     } = found;
     let Confirmed { grown, mut steps, tentative, agreed } = confirmed;
     let first = rounds.first();
+    search.reporter.enter(Stage::Judging, "judging the held-out presses");
     let share = search.share_left(&base, &grown);
     let named = !names(&grown.parameters, search.known_terms).is_empty();
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
@@ -166,6 +169,7 @@ pub(crate) fn conclude(
         steps.push(coarse(*step_counts, *p_value, grown_level.heldout_rms_counts));
     }
     let pairs = if named { undecided(&equivalent, &grown) } else { Vec::new() };
+    search.reporter.enter(Stage::Planning, "planning what to measure next");
     let plan = prepared.planner(experiments, options).plan(Open {
         pairs: &pairs,
         not_shown: &not_shown,

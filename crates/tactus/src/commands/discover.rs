@@ -6,6 +6,7 @@ mod model;
 mod print;
 mod residuals;
 mod settled;
+mod stages;
 mod twin_experiments;
 mod unfinished;
 
@@ -28,6 +29,7 @@ use crate::exit::{Exit, Failure};
 use crate::output;
 use crate::progress::ComputationProgress;
 use measurements::Measurements;
+use stages::StageLog;
 use twin_experiments::TwinExperiments;
 use unfinished::UnfinishedFolder;
 
@@ -68,11 +70,12 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     let progress = ComputationProgress::new(common.json);
     let declared = args.model.as_deref().map(declared).transpose()?;
     let folder = UnfinishedFolder::create(&args.out)?;
+    let stages = args.stages.as_deref().map(StageLog::create).transpose()?;
     let (lab, library): (Vec<LabEffect>, Vec<&'static Definition>) =
         args.library.in_use()?.into_iter().unzip();
     let analyse = |files: &[PathBuf], live: Option<&LiveRig>, drafts: &[&'static Definition]| {
         let drafts = [&library, drafts].concat();
-        analysed(args, declared.clone(), files, live, &drafts, &progress)
+        analysed(args, declared.clone(), files, live, &drafts, &progress, stages.as_ref())
     };
     let mut discovered = if args.active {
         active::discover(common, args, &progress, analyse)?
@@ -81,8 +84,10 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     };
     discovered.lab = lab;
     progress.show("writing", 1.0);
+    stages.iter().for_each(|stages| stages.note("writing"));
     discovered.write(folder.path())?;
     folder.finish()?;
+    stages.iter().for_each(|stages| stages.note("end"));
     let drafts = discovered.drafts()?;
     let names = FILES.into_iter().chain(drafts.iter().map(|(name, _)| name.as_str()));
     let paths = names.map(|name| std::path::absolute(args.out.join(name))).collect::<Result<Vec<_>, _>>()?;
@@ -103,8 +108,10 @@ fn analysed(
     live: Option<&LiveRig>,
     drafts: &[&'static Definition],
     progress: &ComputationProgress,
+    stages: Option<&StageLog>,
 ) -> anyhow::Result<Discovered> {
     progress.show("reading", 0.0);
+    stages.iter().for_each(|stages| stages.note("reading"));
     let measured = Measurements::read(files)?;
     if let Some(live) = live.filter(|live| live.name != measured.rig.name) {
         let error = format!(
@@ -129,7 +136,8 @@ fn analysed(
     let live = live.and_then(|live| live.rig.as_ref());
     let experiments = TwinExperiments::of(&measured, live, args.experiments.as_deref())?;
     let found = tactus_discover::discover(&known, &measured.frames, options, &experiments, &|now| {
-        progress.show(&now.what, now.share);
+        progress.show(&now.what, 0.0);
+        stages.iter().for_each(|stages| stages.tell(&now));
     });
     let mut discovery = found.map_err(|error| match error {
         DiscoverError::TooLittle(_) => {
