@@ -43,7 +43,7 @@ fn discover_on_threads(
     reporter.enter(Stage::Base, "recalibrating the base model");
     let prepared = Prepared::new(known, frames, options.seed)?;
     if prepared.floor == Floor::None {
-        reporter.enter(Stage::Planning, "planning what to measure next");
+        reporter.enter(Stage::Planning { questions: 0 }, "planning what to measure next");
         return cannot_judge(&prepared, options, experiments);
     }
     let problem = prepared.problem();
@@ -62,6 +62,7 @@ fn discover_on_threads(
         reporter: &reporter,
     };
     let before = search.locate(&base)?;
+    reporter.enter(Stage::Scattering, "testing the scatter");
     let scattered = search.scattered(&base)?;
     let Grown { at: grown, rounds, mut equivalent, refused, exchanged, .. } = match options.rule {
         Rule::Protocol => search.grow(&base)?,

@@ -5,8 +5,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A crate's sources, and its modules in order. What stands in no module is above all of them.
-const ORDERED: [(&str, &[&str]); 1] =
-    [("crates/tactus-discover/src", &["numbers", "progress", "data", "fit", "search", "next", "verdict", "discover"])];
+const ORDERED: [(&str, &[&str]); 1] = [(
+    "crates/tactus-discover/src",
+    &["numbers", "progress", "data", "fit", "search", "next", "verdict", "discover"],
+)];
 
 #[test]
 fn modules_use_only_those_before_them() {

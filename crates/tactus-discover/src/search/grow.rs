@@ -196,14 +196,18 @@ impl Search<'_> {
             let index = grown.rounds.len();
             let count = names(&grown.at.parameters, self.known_terms).len();
             let round = index + 1;
-            self.reporter.enter(Stage::Scoring { names: count }, &format!("round {round}: scoring the effects"));
+            self.reporter
+                .enter(Stage::Scoring { names: count }, &format!("round {round}: scoring the effects"));
             let pass = self.pass(&grown.at)?;
+            self.reporter
+                .enter(Stage::Testing { names: count }, &format!("round {round}: testing the scores"));
             let mut tried = self.tested(&pass, &grown.at, index);
             let is_full = count >= NAMES_MAX || index >= 2 * NAMES_MAX;
             // What is small beside the gain of another class may be an error of that one's form.
             let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
             let (fits, refused) = if 2.0 * tried.p_value <= ALPHA && !is_full {
-                self.reporter.enter(Stage::Fitting { names: count }, &format!("round {round}: fitting effects"));
+                self.reporter
+                    .enter(Stage::Fitting { names: count }, &format!("round {round}: fitting effects"));
                 self.next(grown, &pass, least)?
             } else {
                 (Vec::new(), None)

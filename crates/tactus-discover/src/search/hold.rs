@@ -5,7 +5,8 @@ use super::contests::Contest;
 use super::evidence::Set;
 use super::given_up::{Because, GivenUp};
 use super::grow::{
-    ALPHA, Alike, Beside, FORM_SHARE, Grown, LN_ODDS_LEAST, POLISH_ROUNDS, PROMISE_SHARE, Search, TRIAL_ROUNDS, is_exact, names, without,
+    ALPHA, Alike, Beside, FORM_SHARE, Grown, LN_ODDS_LEAST, POLISH_ROUNDS, PROMISE_SHARE, Search,
+    TRIAL_ROUNDS, is_exact, names, without,
 };
 use super::pass::{Pass, rivals_win};
 use super::varying::varying_effect;
@@ -34,7 +35,7 @@ impl Search<'_> {
             let mut leaves: Option<bool> = None;
             grown.equivalent.clear();
             let names = names(&grown.at.parameters, self.known_terms);
-            self.reporter.enter(Stage::Withdrawing { names: names.len() }, "withdrawing each name");
+            self.reporter.enter(Stage::Withdrawing, "withdrawing each name");
             let without = |name: &&'static str| {
                 self.reporter.tell(&format!("without {name}"));
                 let less = without(&grown.at.parameters, name, self.known_terms);

@@ -84,7 +84,7 @@ pub(crate) fn confirmed(
     let Formed { at: grown, refuted } = formed;
     let with_silent = prepared.problem_with_silent();
     let names = names(&grown.parameters, search.known_terms);
-    search.reporter.enter(Stage::Confirming { names: names.len() }, "confirming the names on folds of presses");
+    search.reporter.enter(Stage::Confirming, "confirming the names on folds of presses");
     let steps = search.steps(&grown, equivalent, &refuted, &with_silent)?;
     // A miswired element acts on its own readings, of which a fold may have none.
     let is_firm = |step: &Step| {
@@ -169,7 +169,8 @@ pub(crate) fn conclude(
         steps.push(coarse(*step_counts, *p_value, grown_level.heldout_rms_counts));
     }
     let pairs = if named { undecided(&equivalent, &grown) } else { Vec::new() };
-    search.reporter.enter(Stage::Planning, "planning what to measure next");
+    let questions = pairs.len() + usize::from(with_draft.is_some());
+    search.reporter.enter(Stage::Planning { questions }, "planning what to measure next");
     let plan = prepared.planner(experiments, options).plan(Open {
         pairs: &pairs,
         not_shown: &not_shown,
