@@ -334,6 +334,22 @@ discovery-constants: discovery-quick
     target/debug/tactus-bench evidence contests --size quick \
         --work target/evidence/quick/work --labels target/evidence/quick/labels
 
+# How much of a discovery's time is left in each of its stages, on a quiet machine, some 15 minutes: first the table for
+# crates/tactus-discover/src/progress.rs from 54 tuning sets, then from 89 other ones how often the table that stands there is right.
+discovery-progress:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    cargo build --profile dist --package tactus --package tactus-bench
+    evidence() {
+        target/dist/tactus-bench evidence "$1" --work "target/evidence/$2/work" --labels "target/evidence/$2/labels" "${@:3}"
+    }
+    evidence run progress --size quick > /dev/null
+    evidence progress progress --size quick
+    for part in /01 z100-1 power white-01; do
+        evidence run progress-check --size whole --only "$part" > /dev/null
+    done
+    evidence progress progress-check --size whole
+
 # The part of it that fails if discovery has become worse: always the same 46 sets, some two minutes on two cores.
 discovery-slice:
     cargo build --profile dist --package tactus --package tactus-bench

@@ -14,6 +14,7 @@ mod drafts;
 mod forms;
 mod outcome;
 mod picture;
+mod progress;
 mod rate;
 mod run;
 mod score;
@@ -30,6 +31,7 @@ pub use document::{Costs, Part, document, into_document, misses};
 pub use forms::{Form, forms_table};
 pub use outcome::{Named, Outcome, Truth, read};
 pub use picture::pictures;
+pub use progress::{Moment, moments, progress_table};
 pub use rate::{Rate, normal_share, quantile};
 pub use run::{Places, Progress, Ran, Workflow, run};
 pub use score::{

@@ -10,7 +10,8 @@ use clap::{Args, Subcommand, ValueEnum};
 use tactus_bench::evidence::{
     self, Ablation, Campaign, Costs, Form, Observed, Outcome, Places, Planned, Scores, Seeds, Sizes, TWINS,
     Timing, Workflow, ablations, campaigns, constants_table, contests, contests_table, document, forms_table,
-    into_document, misses, pictures, quantile, read, run, separate, summary, twins_table,
+    into_document, misses, moments, pictures, progress_table, quantile, read, run, separate, summary,
+    twins_table,
 };
 
 #[derive(Debug, Args)]
@@ -32,6 +33,9 @@ enum Part {
     Constants(WhichArgs),
     /// Prints how near rivals without a name come to the effects that are named in the tuning sets that have been run.
     Contests(WhichArgs),
+    /// Prints for each stage of a discovery how much time was left then, and how often the program would have told it right, in the tuning
+    /// sets that have been run.
+    Progress(WhichArgs),
     /// Prints how well the library's effects follow each form of hidden physics.
     Forms(FormsArgs),
     /// Measures time and memory of `tactus discover`, by default for 9,000 to 144,000 frames; prints JSON.
@@ -191,6 +195,7 @@ impl EvidenceArgs {
             Part::Separate(which) => which.separate(),
             Part::Constants(which) => which.constants(),
             Part::Contests(which) => which.contests(),
+            Part::Progress(which) => which.progress(),
             Part::Forms(args) => args.run(),
             Part::Time(args) => args.run(),
             Part::Active(args) => args.run(),
@@ -299,6 +304,12 @@ impl WhichArgs {
     fn contests(&self) -> Result<()> {
         self.check_tuning()?;
         println!("{}", contests_table(&contests(&self.sets(), &self.places())?));
+        Ok(())
+    }
+
+    fn progress(&self) -> Result<()> {
+        self.check_tuning()?;
+        println!("{}", progress_table(&moments(&self.sets(), &self.places())?));
         Ok(())
     }
 

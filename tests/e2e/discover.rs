@@ -9,7 +9,7 @@ use std::{fs, thread};
 use rustix::fs::{CWD, Mode, mkfifoat};
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{CommandOutput, Process, repository, tactus};
+use tactus_e2e::{CommandOutput, Process, Terminal, repository, tactus};
 use tactus_record::rows;
 use tactus_record::table::TableWriter;
 use tactus_schema::DraftFile;
@@ -341,6 +341,20 @@ fn the_same_data_and_seed_give_the_same_report() {
         "{:?}",
         listed(folder.path())
     );
+}
+
+#[test]
+fn a_person_sees_the_share_done_and_a_range_of_the_time_left() {
+    let folder = TempDir::new().unwrap();
+    hide(folder.path(), "hum-sine", 1.0);
+    let recording = diagnosed(folder.path(), &["--truth", "hidden.toml"], "1");
+    let mut run = Terminal::start("tactus", folder.path(), &["discover", &recording], [120, 30]);
+    run.wait_until(|screen| {
+        let bar = screen.lines().find(|line| line.contains("scoring the effects"));
+        bar.is_some_and(|line| line.contains(" % ") && line.contains(" to ") && line.contains(" left "))
+    });
+    run.wait_for(&["report.html"]);
+    assert_eq!(run.wait(), Some(0));
 }
 
 #[test]

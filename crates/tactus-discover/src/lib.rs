@@ -21,7 +21,7 @@ pub use fit::RunWalks;
 pub use next::{
     Experiments, LeftOut, NextExperiment, OpenQuestion, Plan, Rehearsal, RehearsalOrder, WORTH_Z,
 };
-pub use progress::{Progress, Stage};
+pub use progress::{Progress, Stage, TimeLeft};
 pub use search::{
     Because, Contest, Curve, Gap, GivenUp, NoDraft, NotShown, Options, Point, RefutedFormula, Rivalry, Round,
     Rule, TriedEffect,

@@ -66,7 +66,7 @@ pub enum Stage {
     Drafting,
     /// Experiments are rehearsed.
     Planning {
-        /// Explanations that an experiment should separate.
+        /// Pairs of explanations that an experiment should separate.
         questions: usize,
     },
 }
@@ -107,9 +107,35 @@ impl Stage {
         }
     }
 
-    /// The time left in times of the time so far: quantiles of 10, 50 and 90 %. `None` while the time so far says nothing.
-    pub fn left(self) -> Option<[f64; 3]> {
-        LEFT.iter().find(|(name, _)| *name == self.name()).map(|(_, left)| *left)
+    /// How much of the time is left in this stage.
+    pub fn left(self) -> Option<TimeLeft> {
+        TimeLeft::in_stage(self.name())
+    }
+}
+
+/// The time left of a discovery, in times of the time so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimeLeft {
+    least: f64,
+    median: f64,
+    most: f64,
+}
+
+impl TimeLeft {
+    /// That in the stage of this name.
+    pub fn in_stage(name: &str) -> Option<Self> {
+        let (_, [least, median, most]) = *LEFT.iter().find(|(known, _)| *known == name)?;
+        Some(Self { least, median, most })
+    }
+
+    /// A range that holds the time left with a probability of 80 %.
+    pub fn range_s(self, elapsed_s: f64) -> [f64; 2] {
+        [self.least * elapsed_s, self.most * elapsed_s]
+    }
+
+    /// The share of the discovery that is done if the median is left, 0 to 1.
+    pub fn share_done(self) -> f64 {
+        1.0 / (1.0 + self.median)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Progress bars for runs and for computations.
 
+mod discovery;
+
 use std::fmt;
 use std::io::{self, Write as _};
 use std::mem;
@@ -14,6 +16,7 @@ use tactus_runner::twin::{Attend, SoFar};
 use tactus_schema::pb::{RunPhase, RunState};
 
 use crate::output::duration;
+pub(crate) use discovery::DiscoveryProgress;
 
 /// Progress bar of a run on standard error, after that of its dry run: presses, frames, losses, time left. Hidden with `--json` and without a
 /// terminal.
@@ -209,8 +212,7 @@ fn show(bar: &ProgressBar, state: &RunState) {
     });
 }
 
-/// Progress bar of a computation: about what share is done, the time so far, the current step. How long the rest takes depends on what the
-/// data hold, and is not told. Hidden where [`RunProgress`] is.
+/// Progress bar of a computation in steps: what share of them is done, the time so far, the current step. Hidden where [`RunProgress`] is.
 #[derive(Debug)]
 pub(crate) struct ComputationProgress {
     bar: ProgressBar,

@@ -27,7 +27,7 @@ use tactus_schema::{Model, Rig};
 use crate::cli::{Ablation, Common, DiscoverArgs};
 use crate::exit::{Exit, Failure};
 use crate::output;
-use crate::progress::ComputationProgress;
+use crate::progress::{Busy, DiscoveryProgress};
 use measurements::Measurements;
 use stages::StageLog;
 use twin_experiments::TwinExperiments;
@@ -67,31 +67,26 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
         let error = format!("--tolerance must be above 0 counts, not {counts}");
         return Err(Failure::new(Exit::Usage, error).into());
     }
-    let progress = ComputationProgress::new(common.json);
     let declared = args.model.as_deref().map(declared).transpose()?;
     let folder = UnfinishedFolder::create(&args.out)?;
-    let stages = args.stages.as_deref().map(StageLog::create).transpose()?;
+    let stages = StageLog::default();
     let (lab, library): (Vec<LabEffect>, Vec<&'static Definition>) =
         args.library.in_use()?.into_iter().unzip();
     let analyse = |files: &[PathBuf], live: Option<&LiveRig>, drafts: &[&'static Definition]| {
         let drafts = [&library, drafts].concat();
-        analysed(args, declared.clone(), files, live, &drafts, &progress, stages.as_ref())
+        analysed(common, args, declared.clone(), files, live, &drafts, &stages)
     };
-    let mut discovered = if args.active {
-        active::discover(common, args, &progress, analyse)?
-    } else {
-        analyse(&args.files, None, &[])?
-    };
+    let mut discovered =
+        if args.active { active::discover(common, args, analyse)? } else { analyse(&args.files, None, &[])? };
     discovered.lab = lab;
-    progress.show("writing", 1.0);
-    stages.iter().for_each(|stages| stages.note("writing"));
+    let busy = Busy::with("writing", common.json);
     discovered.write(folder.path())?;
     folder.finish()?;
-    stages.iter().for_each(|stages| stages.note("end"));
+    drop(busy);
+    args.stages.as_deref().map(|path| stages.finish(path)).transpose()?;
     let drafts = discovered.drafts()?;
     let names = FILES.into_iter().chain(drafts.iter().map(|(name, _)| name.as_str()));
     let paths = names.map(|name| std::path::absolute(args.out.join(name))).collect::<Result<Vec<_>, _>>()?;
-    progress.clear();
     if common.json {
         output::write(&discovery_json(&discovered.report()))?;
     } else {
@@ -102,17 +97,17 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
 
 /// Analyses files, which must be of the rig `live` if that is given.
 fn analysed(
+    common: &Common,
     args: &DiscoverArgs,
     declared: Option<Model>,
     files: &[PathBuf],
     live: Option<&LiveRig>,
     drafts: &[&'static Definition],
-    progress: &ComputationProgress,
-    stages: Option<&StageLog>,
+    stages: &StageLog,
 ) -> anyhow::Result<Discovered> {
-    progress.show("reading", 0.0);
-    stages.iter().for_each(|stages| stages.note("reading"));
-    let measured = Measurements::read(files)?;
+    let busy = Busy::with("reading", common.json);
+    let measured = busy.reads(|| Measurements::read(files))?;
+    drop(busy);
     if let Some(live) = live.filter(|live| live.name != measured.rig.name) {
         let error = format!(
             "the data are of rig {:?}, but experiments would run on rig {:?}: name the rig of the data with --rig or --rig-file",
@@ -135,10 +130,12 @@ fn analysed(
     let options = Options { seed: args.seed, threads, rule, tolerance_counts: args.tolerance };
     let live = live.and_then(|live| live.rig.as_ref());
     let experiments = TwinExperiments::of(&measured, live, args.experiments.as_deref())?;
+    let progress = DiscoveryProgress::new(common.json);
     let found = tactus_discover::discover(&known, &measured.frames, options, &experiments, &|now| {
-        progress.show(&now.what, 0.0);
-        stages.iter().for_each(|stages| stages.tell(&now));
+        progress.show(&now);
+        stages.note(&now);
     });
+    drop(progress);
     let mut discovery = found.map_err(|error| match error {
         DiscoverError::TooLittle(_) => {
             anyhow!("{error}; `tactus run diagnose` measures enough; give its recording beside these data")

@@ -20,7 +20,7 @@ use super::calibrate::{self, Calibrated};
 use crate::cli::{Common, StudyArgs};
 use crate::exit::Exit;
 use crate::output::{self, duration, say, say_next};
-use crate::progress::ComputationProgress;
+use crate::progress::{Busy, ComputationProgress};
 use steps::{CompletedStep, StudySteps};
 
 /// Figures computed from the model alone. Figures 2 and 5 come from the calibration, Figure 8 from the rig's images.
@@ -31,12 +31,11 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     let mut steps = StudySteps::resume(common, args)?;
     let taken = steps.measure(common, args)?;
-    let progress = ComputationProgress::new(common.json);
-    progress.show("calibration", 0.0);
+    let busy = Busy::with("calibration", common.json);
     let recordings: Vec<_> = taken.iter().map(|taken| taken.recording.clone()).collect();
     let calibrated = calibrate::from_files(&recordings)?;
     calibrate::write(&calibrated, &args.out.join("calibration"))?;
-    progress.clear();
+    drop(busy);
     let truth = quantities::truth(&recordings[0])?;
     let mut missing = calibrated.calibration.missing.clone();
     let images = if taken.iter().all(|taken| taken.embedded) {

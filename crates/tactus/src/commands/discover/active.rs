@@ -18,7 +18,6 @@ use crate::commands::run::{RunSummary, execute_part};
 use crate::connection;
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, say};
-use crate::progress::ComputationProgress;
 
 /// Runs experiments on the service or on the embedded rig.
 struct ExperimentRunner<'a> {
@@ -46,7 +45,6 @@ struct ChosenExperiment {
 pub(super) fn discover(
     common: &Common,
     args: &DiscoverArgs,
-    progress: &ComputationProgress,
     analyse: impl Fn(&[PathBuf], Option<&LiveRig>, &[&'static Definition]) -> anyhow::Result<Discovered>,
 ) -> anyhow::Result<Discovered> {
     let mut runner = ExperimentRunner::find(common, args)?;
@@ -61,7 +59,6 @@ pub(super) fn discover(
     let mut settled: Vec<Settled> = Vec::new();
     let mut active_ended = None;
     for nth in 1..=args.rounds {
-        progress.clear();
         let chosen = match choose(&discovered.discovery, runner.budget_s, &active) {
             Ok(chosen) => chosen,
             Err(why) => {
