@@ -334,7 +334,7 @@ discovery-constants: discovery-quick
     target/debug/tactus-bench evidence contests --size quick \
         --work target/evidence/quick/work --labels target/evidence/quick/labels
 
-# How much of a discovery's time is left in each of its stages, on a quiet machine, some 15 minutes: first the table for
+# How much of a discovery's time is left in each of its stages, some 15 minutes on two cores: first the table for
 # crates/tactus-discover/src/progress.rs from 54 tuning sets, then from 89 other ones how often the table that stands there is right.
 discovery-progress:
     #!/usr/bin/env bash

@@ -162,3 +162,7 @@ impl<'a> Reporter<'a> {
         (self.progress)(Progress { what: what.to_owned(), stage });
     }
 }
+
+#[cfg(test)]
+#[path = "progress_tests.rs"]
+mod tests;

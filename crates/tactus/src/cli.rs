@@ -566,7 +566,7 @@ pub(crate) struct DiscoverArgs {
     /// Use another method, for comparison.
     #[arg(long, hide = true, value_name = "WAY")]
     pub(crate) ablation: Option<Ablation>,
-    /// Write when each stage began, as JSON lines: the table of the time left is made from these.
+    /// Write when each stage began, in time of the processor: the table of the time left is made from this.
     #[arg(long, hide = true, value_name = "FILE")]
     pub(crate) stages: Option<PathBuf>,
 }

@@ -133,7 +133,9 @@ fn analysed(
     let progress = DiscoveryProgress::new(common.json);
     let found = tactus_discover::discover(&known, &measured.frames, options, &experiments, &|now| {
         progress.show(&now);
-        stages.note(&now);
+        if args.stages.is_some() {
+            stages.note(&now);
+        }
     });
     drop(progress);
     let mut discovery = found.map_err(|error| match error {
