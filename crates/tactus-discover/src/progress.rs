@@ -73,7 +73,31 @@ pub enum Stage {
 
 /// For each stage, the time left in times of the time so far: quantiles of 10, 50 and 90 %. `just discovery-progress` prints this table.
 #[rustfmt::skip]
-const LEFT: [(&str, [f64; 3]); 0] = [
+const LEFT: [(&str, [f64; 3]); 24] = [
+    ("base", [25.67, 79.00, 399.00]),
+    ("comparing several", [0.59, 1.03, 1.81]),
+    ("comparing the last", [0.10, 0.29, 0.86]),
+    ("comparing the last two", [0.17, 0.45, 1.91]),
+    ("confirming", [0.04, 0.11, 0.34]),
+    ("contests", [0.11, 0.22, 0.38]),
+    ("drafting", [0.17, 0.78, 2.10]),
+    ("fitting beside none", [1.14, 1.76, 4.19]),
+    ("fitting beside one", [0.29, 0.97, 5.80]),
+    ("fitting beside several", [0.49, 1.55, 4.03]),
+    ("forms", [0.05, 0.12, 0.45]),
+    ("judging", [0.03, 0.07, 1.52]),
+    ("locating", [3.21, 11.12, 35.36]),
+    ("locating what is left", [0.03, 0.08, 0.25]),
+    ("planning", [0.02, 0.13, 0.41]),
+    ("planning without a question", [0.00, 0.02, 0.05]),
+    ("scattering", [2.05, 5.67, 11.51]),
+    ("scoring beside none", [0.34, 2.36, 6.84]),
+    ("scoring beside one", [0.36, 0.80, 2.15]),
+    ("scoring beside several", [0.59, 1.34, 4.33]),
+    ("testing beside none", [0.10, 1.55, 3.38]),
+    ("testing beside one", [0.21, 0.35, 2.16]),
+    ("testing beside several", [0.39, 0.83, 2.76]),
+    ("withdrawing", [0.35, 0.96, 1.71]),
 ];
 
 impl Stage {

@@ -39,7 +39,7 @@ fn every_stage_has_a_row_and_every_row_a_stage() {
 #[test]
 fn quantiles_are_in_order() {
     for (name, left) in LEFT {
-        assert!(left[0] > 0.0 && left.is_sorted(), "{name}");
+        assert!(left[0] >= 0.0 && left.is_sorted(), "{name}");
     }
 }
 
