@@ -1,7 +1,9 @@
 //! Output for people: aligned tables and durations.
 
-use std::fmt::Write as _;
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
+
+use comfy_table::presets::NOTHING;
+use comfy_table::{ContentArrangement, Table};
 
 /// Prints `name  value` lines with the values aligned.
 pub(crate) fn print_fields(fields: &[(&str, String)]) {
@@ -11,48 +13,30 @@ pub(crate) fn print_fields(fields: &[(&str, String)]) {
     }
 }
 
-/// Prints a table with a header, columns aligned to their widest cell.
+/// Prints a table with a header. At a terminal it is as wide as that at most: long cells go on in further lines.
 pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
-    for line in table(header, rows) {
-        say(&line);
-    }
+    say(&table(header, rows, terminal_columns()));
 }
 
-/// As [`print_table`], with lines that end at the edge of the terminal: the last column gives way.
-pub(crate) fn print_table_cut(header: &[&str], rows: &[Vec<String>]) {
+/// Width of the terminal at standard output; `None` if that is no terminal.
+pub(crate) fn terminal_columns() -> Option<usize> {
     let is_terminal = std::io::stdout().is_terminal();
     let size = is_terminal.then(|| ratatui::crossterm::terminal::size().ok()).flatten();
-    let width = size.map_or(usize::MAX, |(columns, _)| usize::from(columns).max(1));
-    for line in table(header, rows) {
-        say(&cut(&line, width));
-    }
+    size.map(|(columns, _)| usize::from(columns))
 }
 
-/// A line of at most so many characters; an ellipsis says that something is missing.
-fn cut(line: &str, width: usize) -> String {
-    if line.chars().count() <= width {
-        return line.to_owned();
+fn table(header: &[&str], rows: &[Vec<String>], columns: Option<usize>) -> String {
+    let mut table = Table::new();
+    table.load_preset(NOTHING).set_header(header).add_rows(rows);
+    if let Some(columns) = columns {
+        // Wider ones than its numbers can say are wide enough.
+        let columns = u16::try_from(columns).unwrap_or(u16::MAX);
+        table.set_content_arrangement(ContentArrangement::Dynamic).set_width(columns);
     }
-    line.chars().take(width.saturating_sub(1)).chain(['…']).collect()
-}
-
-fn table(header: &[&str], rows: &[Vec<String>]) -> Vec<String> {
-    let mut widths: Vec<_> = header.iter().map(|cell| cell.chars().count()).collect();
-    for row in rows {
-        for (width, cell) in widths.iter_mut().zip(row) {
-            *width = (*width).max(cell.chars().count());
-        }
+    for column in table.column_iter_mut() {
+        column.set_padding((0, 2));
     }
-    let line = |cells: &mut dyn Iterator<Item = &str>| {
-        let mut line = String::new();
-        for (cell, width) in cells.zip(&widths) {
-            // Writing to a string cannot fail.
-            let _written = write!(line, "{cell:width$}  ");
-        }
-        line.trim_end().to_owned()
-    };
-    let header = line(&mut header.iter().copied());
-    [header].into_iter().chain(rows.iter().map(|row| line(&mut row.iter().map(String::as_str)))).collect()
+    table.trim_fmt()
 }
 
 /// Prints a line. If the reader closed the pipe, as `head` does, the program continues.

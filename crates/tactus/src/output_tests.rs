@@ -1,4 +1,4 @@
-use super::{cut, duration, table};
+use super::{duration, table};
 
 #[test]
 fn durations_are_in_words_without_sixty_seconds() {
@@ -17,10 +17,10 @@ fn durations_are_in_words_without_sixty_seconds() {
 }
 
 #[test]
-fn a_table_is_aligned_and_a_line_ends_at_the_edge() {
+fn a_table_is_aligned_and_ends_at_the_edge() {
     let rows = [vec!["left".to_owned(), "idle".to_owned()], vec!["b".to_owned(), "a long story".to_owned()]];
-    let lines = table(&["RIG", "WHAT"], &rows);
-    assert_eq!(lines, ["RIG   WHAT", "left  idle", "b     a long story"]);
-    assert_eq!(cut(&lines[2], 10), "b     a l…");
-    assert_eq!(cut(&lines[1], 10), "left  idle");
+    let lines = table(&["RIG", "WHAT"], &rows, None);
+    assert_eq!(lines, "RIG   WHAT\nleft  idle\nb     a long story");
+    let narrow = table(&["RIG", "WHAT"], &rows, Some(16));
+    assert_eq!(narrow, "RIG   WHAT\nleft  idle\nb     a long\n      story");
 }

@@ -10,7 +10,7 @@ use tactus_schema::{pb, with_message};
 use crate::cli::{Common, LeaseArgs, ResumeArgs, StopArgs};
 use crate::connection::{self, PATIENCE};
 use crate::exit::{Exit, Failure};
-use crate::output::{duration, print_fields, print_table_cut, say_next};
+use crate::output::{duration, print_fields, print_table, say_next};
 
 /// How long to wait for `reset`: homing is slow.
 const HOMING_PATIENCE: Duration = Duration::from_mins(2);
@@ -42,7 +42,7 @@ fn show_all(common: &Common, answers: &[(String, Result<pb::CommandReply, BusErr
         return;
     }
     let rows: Vec<_> = answers.iter().map(|(rig, reply)| row(rig, reply)).collect();
-    print_table_cut(&["RIG", "STATE", "FRAMES", "LOST", "LEASE", "WHAT"], &rows);
+    print_table(&["RIG", "STATE", "FRAMES", "LOST", "LEASE", "WHAT"], &rows);
     say_next("`tactus status --rig NAME` shows one in detail");
 }
 

@@ -111,15 +111,38 @@ fn print(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by: &
         fields.push(("written", out.display().to_string()));
     }
     print_fields(&fields);
-    let mut text = String::new();
-    for image in copies {
-        text.push('\n');
-        // Row 0 last, because y points up.
-        for row in rows(array, image).iter().rev() {
-            let cells: Vec<_> = row.iter().map(|counts| format!("{counts:5.0}")).collect();
-            text.push_str(&cells.join(" "));
-            text.push('\n');
+    let images: Vec<_> = copies.iter().map(|image| format!("\n{}", in_numbers(array, image))).collect();
+    let widest = images.iter().flat_map(|image| image.lines()).map(str::len).max().unwrap_or(0);
+    match output::terminal_columns() {
+        Some(columns) if widest > columns => {
+            let images = copies.iter().map(|image| format!("\n{}", in_shades(array, image)));
+            output::write(&images.collect::<String>())?;
+            output::say("\nThe counts of a row do not fit here; --out FILE.csv or --json has them.");
+            Ok(())
         }
+        _ => output::write(&images.concat()),
     }
-    output::write(&text)
+}
+
+/// The counts, row 0 last, because y points up.
+fn in_numbers(array: &Array, image: &[f64]) -> String {
+    let line = |row: &&[f64]| {
+        let cells: Vec<_> = row.iter().map(|counts| format!("{counts:5.0}")).collect();
+        format!("{}\n", cells.join(" "))
+    };
+    rows(array, image).iter().rev().map(line).collect()
+}
+
+/// Shades from the least to the greatest counts, row 0 last.
+fn in_shades(array: &Array, image: &[f64]) -> String {
+    let [least, most] = image.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], counts| {
+        [least.min(*counts), most.max(*counts)]
+    });
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 4")]
+    let shade = |counts: &f64| {
+        let share = if most > least { (counts - least) / (most - least) } else { 0.0 };
+        ["  ", "░░", "▒▒", "▓▓", "██"][(4.0 * share).round() as usize]
+    };
+    let line = |row: &&[f64]| format!("{}\n", row.iter().map(shade).collect::<String>().trim_end());
+    rows(array, image).iter().rev().map(line).collect()
 }
