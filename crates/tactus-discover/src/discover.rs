@@ -43,7 +43,7 @@ fn discover_on_threads(
     reporter.enter(Stage::Base, "recalibrating the base model");
     let prepared = Prepared::new(known, frames, options.seed)?;
     if prepared.floor == Floor::None {
-        reporter.enter(Stage::Planning { questions: 0 }, "planning what to measure next");
+        reporter.enter_planning(0);
         return cannot_judge(&prepared, options, experiments);
     }
     let problem = prepared.problem();
@@ -79,6 +79,7 @@ fn discover_on_threads(
     let left = search.left(&confirmed.grown)?;
     let after = search.locate(&confirmed.grown)?;
     let scatters = [scattered, search.scattered(&confirmed.grown)?];
+    reporter.enter(Stage::Judging, "judging the held-out presses");
     conclude(
         &prepared,
         &search,

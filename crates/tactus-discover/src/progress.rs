@@ -180,6 +180,11 @@ impl<'a> Reporter<'a> {
         self.tell(what);
     }
 
+    /// The last stage begins.
+    pub(crate) fn enter_planning(&self, questions: usize) {
+        self.enter(Stage::Planning { questions }, "planning what to measure next");
+    }
+
     /// An activity within the stage begins.
     pub(crate) fn tell(&self, what: &str) {
         let stage = *self.stage.lock().unwrap_or_else(PoisonError::into_inner);

@@ -131,7 +131,6 @@ pub(crate) fn conclude(
     } = found;
     let Confirmed { grown, mut steps, tentative, agreed } = confirmed;
     let first = rounds.first();
-    search.reporter.enter(Stage::Judging, "judging the held-out presses");
     let share = search.share_left(&base, &grown);
     let named = !names(&grown.parameters, search.known_terms).is_empty();
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
@@ -169,8 +168,7 @@ pub(crate) fn conclude(
         steps.push(coarse(*step_counts, *p_value, grown_level.heldout_rms_counts));
     }
     let pairs = if named { undecided(&equivalent, &grown) } else { Vec::new() };
-    let questions = pairs.len() + usize::from(with_draft.is_some());
-    search.reporter.enter(Stage::Planning { questions }, "planning what to measure next");
+    search.reporter.enter_planning(pairs.len() + usize::from(with_draft.is_some()));
     let plan = prepared.planner(experiments, options).plan(Open {
         pairs: &pairs,
         not_shown: &not_shown,
