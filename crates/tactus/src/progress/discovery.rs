@@ -14,6 +14,8 @@ use super::{ComputationProgress, set_share, target};
 pub(crate) struct DiscoveryProgress {
     bar: ProgressBar,
     left: Arc<Mutex<Option<TimeLeft>>>,
+    /// The greatest share that was told.
+    share: Mutex<f64>,
 }
 
 impl DiscoveryProgress {
@@ -35,20 +37,18 @@ impl DiscoveryProgress {
             bar.set_style(style.with_key("range", range));
         }
         bar.enable_steady_tick(ComputationProgress::TICK);
-        Self { bar, left }
+        Self { bar, left, share: Mutex::new(0.0) }
     }
 
     /// Shows the current activity. The share never falls, also where the search goes back.
     pub(crate) fn show(&self, now: &Progress) {
         if let Some(left) = now.stage.left() {
             *self.left.lock().unwrap_or_else(PoisonError::into_inner) = Some(left);
-            set_share(&self.bar, left.share_done().max(self.share()));
+            let mut share = self.share.lock().unwrap_or_else(PoisonError::into_inner);
+            *share = share.max(left.share_done());
+            set_share(&self.bar, *share);
         }
         self.bar.set_message(now.what.clone());
-    }
-
-    fn share(&self) -> f64 {
-        self.bar.position() as f64 / ComputationProgress::STEPS as f64
     }
 }
 
