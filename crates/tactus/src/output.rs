@@ -27,7 +27,7 @@ pub(crate) fn terminal_columns() -> Option<usize> {
 
 fn table(header: &[&str], rows: &[Vec<String>], columns: Option<usize>) -> String {
     let mut table = Table::new();
-    table.load_preset(NOTHING).set_header(header).add_rows(rows);
+    table.load_style(NOTHING).set_header(header).add_rows(rows);
     if let Some(columns) = columns {
         // Wider ones than its numbers can say are wide enough.
         let columns = u16::try_from(columns).unwrap_or(u16::MAX);
