@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
 
 use comfy_table::presets::NOTHING;
-use comfy_table::{ContentArrangement, Table};
+use comfy_table::{ColumnConstraint, ContentArrangement, Table, Width};
 
 /// Prints `name  value` lines with the values aligned.
 pub(crate) fn print_fields(fields: &[(&str, String)]) {
@@ -12,6 +12,9 @@ pub(crate) fn print_fields(fields: &[(&str, String)]) {
         say(&format!("{name:width$}  {value}"));
     }
 }
+
+/// Space between two columns of a table.
+const GAP: usize = 2;
 
 /// Prints a table with a header. At a terminal it is as wide as that at most: long cells go on in further lines.
 pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
@@ -28,10 +31,18 @@ pub(crate) fn terminal_columns() -> Option<usize> {
 fn table(header: &[&str], rows: &[Vec<String>], columns: Option<usize>) -> String {
     let mut table = Table::new();
     table.load_style(NOTHING).set_header(header).add_rows(rows);
-    if let Some(columns) = columns {
-        // Wider ones than its numbers can say are wide enough.
-        let columns = u16::try_from(columns).unwrap_or(u16::MAX);
-        table.set_content_arrangement(ContentArrangement::Dynamic).set_width(columns);
+    // No word is divided: somebody may want to copy it. A table whose words do not fit is left to the terminal.
+    let longest = |column: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(column)).map(String::as_str);
+        let words = cells.chain([header[column]]).flat_map(str::split_whitespace);
+        words.map(|word| word.chars().count() + GAP).max().unwrap_or(GAP)
+    };
+    let least: Vec<usize> = (0..header.len()).map(longest).collect();
+    if let Some(columns) = columns.filter(|columns| least.iter().sum::<usize>() <= *columns) {
+        let in_cells = |width: usize| u16::try_from(width).unwrap_or(u16::MAX);
+        table.set_content_arrangement(ContentArrangement::Dynamic).set_width(in_cells(columns));
+        let at_least = |width: &usize| ColumnConstraint::LowerBoundary(Width::Fixed(in_cells(*width)));
+        table.set_constraints(least.iter().map(at_least));
     }
     for column in table.column_iter_mut() {
         column.set_padding((0, 2));
