@@ -173,8 +173,18 @@ fn parameter(parameter: &Estimated) -> String {
     let Estimated { name, value, standard_error } = *parameter;
     match standard_error {
         Some(standard_error) => format!("{name} {}", estimate(Estimate { value, standard_error })),
-        None => format!("{name} {value}"),
+        None => format!("{name} {}", four_digits(value)),
     }
+}
+
+/// A whole number as it is, another one with four significant digits.
+fn four_digits(value: f64) -> String {
+    if value.fract() == 0.0 {
+        return value.to_string();
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+    let decimals = (3.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
 }
 
 fn probability(value: f64) -> String {
