@@ -33,7 +33,7 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     let taken = steps.measure(common, args)?;
     let busy = Busy::with("calibration", common.json);
     let recordings: Vec<_> = taken.iter().map(|taken| taken.recording.clone()).collect();
-    let calibrated = calibrate::from_files(&recordings)?;
+    let calibrated = busy.reads(|| calibrate::from_files(&recordings))?;
     calibrate::write(&calibrated, &args.out.join("calibration"))?;
     drop(busy);
     let truth = quantities::truth(&recordings[0])?;
