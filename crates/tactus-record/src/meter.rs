@@ -65,6 +65,10 @@ pub fn count(bytes: u64) {
 impl Meter {
     fn count(&self, bytes: u64) {
         let passes = self.passes.borrow();
+        // What is read before is in none of them.
+        if passes.is_empty() {
+            return;
+        }
         let (mut over, mut read) = (self.over.get(), self.read.get() + bytes);
         while let Some(pass) = passes.get(over).filter(|pass| read >= pass.bytes) {
             (over, read) = (over + 1, read - pass.bytes);
