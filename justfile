@@ -151,14 +151,14 @@ features-tools:
     {{ tools }}/features/bin/pip install --quiet --no-compile --requirement tests/features/requirements.txt
     cd tests/features && PATH="{{ tools }}/features/bin:$PATH" npm install --silent --no-fund --no-audit --no-package-lock
 
-# Many recordings in one place, in a workspace of its own: lints, tests, licences, and DuckDB and polars on the same files. Some five minutes
-# the first time.
+# Many recordings in one place, in a workspace of its own: lints, tests, licences, DuckDB and polars on the same files and with the same
+# queries, and a fleet in a store that speaks S3. Some twenty minutes the first time.
 fleet: deny-tool fleet-tools
     cd fleet && cargo fmt --check
-    cd fleet && cargo clippy --all-targets -- -D warnings
-    cd fleet && cargo test
-    PATH="{{ tools }}/bin:$PATH" cargo deny --manifest-path fleet/Cargo.toml --config deny.toml check licenses bans sources
-    cd fleet && cargo build --example synthetic_tables
+    cd fleet && cargo clippy --all-targets --features s3 -- -D warnings
+    cd fleet && cargo test --features s3
+    PATH="{{ tools }}/bin:$PATH" cargo deny --manifest-path fleet/Cargo.toml --all-features --config deny.toml check licenses bans sources
+    cd fleet && cargo build --features s3 --bin tactus-fleet --example synthetic_tables
     TACTUS_FLEET_PROGRAMS=$PWD/fleet/target/debug {{ tools }}/fleet/bin/pytest -q fleet/tests/python
 
 # A virtual environment with DuckDB and polars.
@@ -272,6 +272,11 @@ bench-rigs *arguments="1,50,100 --record --search 3":
 bench-fleet *arguments: fleet-tools
     cd fleet && cargo build --release --bin tactus-fleet --example synthetic_tables
     {{ tools }}/fleet/bin/python fleet/bench/measure.py --programs fleet/target/release {{ arguments }}
+
+# Queries over 1 GB of synthetic runs and parts of it, beside DuckDB: rows/s, memory, and what disk and memory give. docs/scale.md.
+bench-query *arguments: fleet-tools
+    cd fleet && cargo build --release --bin tactus-fleet --example synthetic_tables
+    {{ tools }}/fleet/bin/python fleet/bench/query.py --programs fleet/target/release --model config/models/digitacts.toml {{ arguments }}
 
 # Both panels of Fig. 6 beside a numpy program.
 bench-acuity *arguments: bench-peers-tools

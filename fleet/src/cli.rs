@@ -8,11 +8,12 @@ use std::{
     thread,
 };
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use clap::{Args, Parser, Subcommand};
 use jiff::civil::Date;
 use serde::Serialize;
 use tactus_report::fleet::{FleetReport, Trend, fleet_html};
+use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
 use crate::{
@@ -21,6 +22,7 @@ use crate::{
     ingest,
     output::{self, number_of},
     progress::Progress,
+    query::{Limits, Lines, OutFile, Query, Table},
     survey::{Analysis, Calibrated, Discovered, Surveyed, findings, results, survey},
 };
 
@@ -37,7 +39,7 @@ struct Cli {
 /// Arguments of every command.
 #[derive(Debug, Args)]
 struct Common {
-    /// Print one JSON object to standard output.
+    /// Print JSON to standard output: one object, or one in each line for the rows of a query.
     #[arg(long, global = true)]
     json: bool,
     /// How many threads compute. Default: one per core.
@@ -59,6 +61,8 @@ enum FleetCommand {
     Calibrate(SurveyArgs),
     /// Search each run for effects that its rig's model lacks; report which rigs share one. Runs that were searched before are kept.
     Discover(SurveyArgs),
+    /// Ask all frames and runs in SQL.
+    Query(QueryArgs),
 }
 
 #[derive(Debug, Args)]
@@ -74,14 +78,39 @@ struct IngestArgs {
     date: Option<Date>,
 }
 
+/// Which fleet is read.
 #[derive(Debug, Args)]
-struct SurveyArgs {
+struct FleetArgs {
     /// The fleet: a folder, or an address such as `s3://bucket/fleet`.
     #[arg(long, value_name = "DIR_OR_URL", default_value = "fleet", env = "TACTUS_FLEET")]
     at: String,
+}
+
+#[derive(Debug, Args)]
+struct SurveyArgs {
+    #[command(flatten)]
+    fleet: FleetArgs,
     /// Folder for the result of each run, and for report.html and report.json, which calibrations and discoveries share.
     #[arg(long, value_name = "DIR", default_value = "survey")]
     out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct QueryArgs {
+    /// One query. `SHOW TABLES` lists the tables, `DESCRIBE frames` the columns of one.
+    #[arg(value_name = "SQL")]
+    sql: String,
+    #[command(flatten)]
+    fleet: FleetArgs,
+    /// Write all rows to a file that ends in .parquet or .csv.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Memory for sorts, groups and joins, in GB. What is beyond goes to the disk.
+    #[arg(long, value_name = "GB", default_value_t = 2.0)]
+    memory: f64,
+    /// Folder for what goes to the disk. Default: that of the system for temporary files.
+    #[arg(long, value_name = "DIR")]
+    spill: Option<PathBuf>,
 }
 
 /// Runs the program with the process's arguments.
@@ -108,6 +137,7 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
         FleetCommand::Ingest(args) => run_ingest(&runtime, &cli.common, args),
         FleetCommand::Calibrate(args) => run_survey::<Calibrated>(&runtime, &cli.common, args),
         FleetCommand::Discover(args) => run_survey::<Discovered>(&runtime, &cli.common, args),
+        FleetCommand::Query(args) => run_query(runtime, &cli.common, args),
     }
 }
 
@@ -126,7 +156,7 @@ fn run_ingest(runtime: &Runtime, common: &Common, args: &IngestArgs) -> anyhow::
 }
 
 fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs) -> anyhow::Result<Exit> {
-    let (place, runtime) = (Place::at(&args.at)?, runtime.handle());
+    let (place, runtime) = (Place::at(&args.fleet.at)?, runtime.handle());
     let progress = Progress::new(common.json);
     let surveyed = survey::<T>(runtime, &place, &args.out, common.threads(), &|now| progress.show(now))?;
     progress.clear();
@@ -146,6 +176,75 @@ fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs
     }
     Ok(if report.refused.is_empty() { Exit::Done } else { Exit::Degraded })
 }
+
+fn run_query(runtime: Runtime, common: &Common, args: &QueryArgs) -> anyhow::Result<Exit> {
+    let place = Place::at(&args.fleet.at)?;
+    let spill = spill_folder(args.spill.as_deref())?;
+    let asked = runtime.block_on(async {
+        tokio::select! {
+            asked = ask(&place, spill.path(), common, args) => asked,
+            interrupted = tokio::signal::ctrl_c() => {
+                interrupted.context("signals cannot be received")?;
+                bail!("stopped by Ctrl-C; nothing is left behind")
+            }
+        }
+    });
+    // A thread in the middle of a join would go on until it has a row.
+    runtime.shutdown_background();
+    asked
+}
+
+/// A folder of the query's own, which disappears with it.
+fn spill_folder(within: Option<&Path>) -> anyhow::Result<TempDir> {
+    let mut folder = tempfile::Builder::new();
+    folder.prefix("tactus-fleet-");
+    match within {
+        Some(within) => folder.tempdir_in(within).with_context(|| within.display().to_string()),
+        None => folder.tempdir().context("there is no folder for temporary files"),
+    }
+}
+
+async fn ask(place: &Place, spill: &Path, common: &Common, args: &QueryArgs) -> anyhow::Result<Exit> {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "such a cast takes the nearest number of bytes that there is"
+    )]
+    let memory_bytes = (args.memory * 1e9) as usize;
+    let limits = Limits { threads: common.threads(), memory_bytes, spill: spill.to_owned() };
+    let query = Query::new(place, &args.sql, &limits).await?;
+    let mut progress = None;
+    let show = |now| progress.get_or_insert_with(|| Progress::new(common.json)).show(now);
+    if let Some(path) = &args.out {
+        let mut file = OutFile::create(path, &query.columns())?;
+        query.run(&mut file, show).await?;
+        drop(progress);
+        let rows = file.finish()?;
+        let told = if common.json {
+            format!("{}\n", serde_json::json!({ "schema": QUERY_SCHEMA, "out": path, "rows": rows }))
+        } else {
+            format!("{}: {}\n", number_of(rows, "row"), path.display())
+        };
+        output::write(&told)?;
+    } else if common.json {
+        query.run(&mut Lines, show).await?;
+    } else {
+        let mut table = Table::new(query.columns());
+        query.run(&mut table, show).await?;
+        drop(progress);
+        output::write(&format!("{}\n", table.in_lines().join("\n")))?;
+        if table.is_cut() {
+            output::write(&format!(
+                "the first {} rows\nnext: the same with --out rows.parquet, which takes all\n",
+                Table::ROWS
+            ))?;
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// What `--json` prints of a query whose rows are in a file.
+const QUERY_SCHEMA: &str = "tactus.fleet.query/1";
 
 /// `report.json`, and what `--json` prints.
 #[derive(Serialize)]

@@ -10,6 +10,7 @@
 //! | `columns` | the columns of a file, and rows as Arrow batches |
 //! | `run_head` | what a file says of its run, in its metadata |
 //! | `ingest` | from recordings to files |
+//! | `query` | SQL over all runs |
 //! | `survey` | calibration and discovery of every run, and what they say together |
 //! | `threads` | how both share their work |
 #![expect(clippy::print_stderr, reason = "errors go to standard error, results to standard output")]
@@ -21,6 +22,7 @@ mod ingest;
 mod output;
 mod place;
 mod progress;
+mod query;
 mod run_head;
 mod survey;
 mod threads;

@@ -27,6 +27,9 @@ pub enum PlaceError {
     /// The address is none, or of a store that this build has not.
     #[error("{url} cannot be used as a fleet: {problem}. It is a folder, file:///FOLDER{s3}", s3 = if cfg!(feature = "s3") { " or s3://BUCKET/FOLDER" } else { ", or s3://BUCKET/FOLDER in a build with `--features s3`" })]
     Address { url: String, problem: String },
+    /// There is no run in it.
+    #[error("{url} holds no run: `tactus fleet ingest RUNS --to {url}` writes some")]
+    Empty { url: String },
     /// The store refused.
     #[error("{url}: {source}")]
     Store { url: String, source: Box<object_store::Error> },
@@ -109,6 +112,17 @@ impl Place {
             of_runs.try_collect().await.map_err(|source| self.refused(source))?;
         files.sort_by(|one, other| one.location.cmp(&other.location));
         Ok(files)
+    }
+
+    /// Refuses a fleet without runs.
+    pub(crate) async fn check_holds_runs(&self) -> Result<(), PlaceError> {
+        let mut files = self.store.list(Some(&self.folder));
+        while let Some(file) = files.try_next().await.map_err(|source| self.refused(source))? {
+            if is_of_run(&file.location) {
+                return Ok(());
+            }
+        }
+        Err(PlaceError::Empty { url: self.url.to_string() })
     }
 
     pub(crate) fn refused(&self, source: object_store::Error) -> PlaceError {

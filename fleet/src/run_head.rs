@@ -1,11 +1,13 @@
 //! What a file says of its run, in its metadata.
 
+use futures::{StreamExt as _, TryStreamExt as _, stream};
 use object_store::{ObjectMeta, ObjectStoreExt as _};
 use parquet::{
     errors::ParquetError,
     file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader},
 };
 use serde::{Deserialize, Serialize};
+use tactus_schema::table::RIG_METADATA_KEY;
 
 use crate::{Place, PlaceError};
 
@@ -66,13 +68,7 @@ impl RunHead {
 
     /// What a file says; its rows are not read.
     pub(crate) async fn read(place: &Place, file: &ObjectMeta) -> Result<Self, HeadError> {
-        let path = file.location.to_string();
-        let not_of_run = |problem: String| HeadError::NotOfRun { path: path.clone(), problem };
-        let metadata = metadata(place, file).await?;
-        let mut pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
-        let head = pairs.find(|pair| pair.key == METADATA_KEY).and_then(|pair| pair.value.as_deref());
-        let head = head.ok_or_else(|| not_of_run(format!("its metadata lack {METADATA_KEY:?}")))?;
-        serde_json::from_str(head).map_err(|error| not_of_run(format!("{METADATA_KEY}: {error}")))
+        of_metadata(file, &metadata(place, file).await?)
     }
 
     /// True if a file with this head need not be written again in place of `known`.
@@ -81,6 +77,51 @@ impl RunHead {
             && self.source_bytes == known.source_bytes
             && self.continued_by == known.continued_by
     }
+}
+
+/// The head of a run, and what else the end of its file says.
+#[derive(Debug)]
+pub(crate) struct Described {
+    pub(crate) head: RunHead,
+    /// The rig's description.
+    pub(crate) rig_json: String,
+    pub(crate) frames: i64,
+    pub(crate) bytes: u64,
+}
+
+impl Described {
+    /// How many files are asked at a time.
+    const AT_A_TIME: usize = 32;
+
+    /// What all files of a fleet say, in order of their paths.
+    pub(crate) async fn all(place: &Place) -> Result<Vec<Self>, HeadError> {
+        let files = stream::iter(place.files().await?);
+        let reads = files.map(async |file| Self::read(place, &file).await);
+        reads.buffered(Self::AT_A_TIME).try_collect().await
+    }
+
+    /// What a file says; its rows are not read.
+    pub(crate) async fn read(place: &Place, file: &ObjectMeta) -> Result<Self, HeadError> {
+        let metadata = metadata(place, file).await?;
+        Ok(Self {
+            head: of_metadata(file, &metadata)?,
+            rig_json: value(file, &metadata, RIG_METADATA_KEY)?.to_owned(),
+            frames: metadata.file_metadata().num_rows(),
+            bytes: file.size,
+        })
+    }
+}
+
+fn of_metadata(file: &ObjectMeta, metadata: &ParquetMetaData) -> Result<RunHead, HeadError> {
+    let head = value(file, metadata, METADATA_KEY)?;
+    serde_json::from_str(head).map_err(|error| not_of_run(file, format!("{METADATA_KEY}: {error}")))
+}
+
+/// What the metadata have under a key.
+fn value<'a>(file: &ObjectMeta, metadata: &'a ParquetMetaData, key: &str) -> Result<&'a str, HeadError> {
+    let mut pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
+    let value = pairs.find(|pair| pair.key == key).and_then(|pair| pair.value.as_deref());
+    value.ok_or_else(|| not_of_run(file, format!("its metadata lack {key:?}")))
 }
 
 async fn metadata(place: &Place, file: &ObjectMeta) -> Result<ParquetMetaData, HeadError> {
@@ -95,12 +136,12 @@ async fn metadata(place: &Place, file: &ObjectMeta) -> Result<ParquetMetaData, H
                 wanted = u64::try_from(more).unwrap_or(u64::MAX).max(wanted + 1).min(file.size);
                 continue;
             }
-            Err(error) => return Err(not_parquet(file, &error)),
+            Err(error) => return Err(not_of_run(file, error.to_string())),
         }
-        return reader.finish().map_err(|error| not_parquet(file, &error));
+        return reader.finish().map_err(|error| not_of_run(file, error.to_string()));
     }
 }
 
-fn not_parquet(file: &ObjectMeta, error: &ParquetError) -> HeadError {
-    HeadError::NotOfRun { path: file.location.to_string(), problem: error.to_string() }
+fn not_of_run(file: &ObjectMeta, problem: String) -> HeadError {
+    HeadError::NotOfRun { path: file.location.to_string(), problem }
 }

@@ -6,6 +6,7 @@ use std::{env, fs, os::unix::fs::PermissionsExt as _, path::Path, process::Comma
 use crate::lab::Lab;
 
 const PAGE: &str = include_str!("../../../docs/book/how-to/fleet.md");
+const MODEL: &str = include_str!("../../../config/models/digitacts.toml");
 
 #[test]
 fn the_commands_of_the_page_do_what_it_says() {
@@ -17,6 +18,9 @@ fn the_commands_of_the_page_do_what_it_says() {
     let program = env!("CARGO_BIN_EXE_tactus-fleet");
     fs::write(&tactus, format!("#!/bin/sh\n[ \"$1\" = fleet ] && shift && exec {program} \"$@\"\n")).unwrap();
     fs::set_permissions(&tactus, fs::Permissions::from_mode(0o755)).unwrap();
+    let models = lab.path("config/models");
+    fs::create_dir_all(&models).unwrap();
+    fs::write(models.join("digitacts.toml"), MODEL).unwrap();
     let mut blocks = 0;
     let mut rest = PAGE;
     while let Some((_, after)) = rest.split_once("```sh by=fleet") {

@@ -3,6 +3,7 @@
 mod book;
 mod ingest;
 mod lab;
+mod query;
 mod survey;
 #[path = "../../../crates/tactus-record/examples/synthetic/mod.rs"]
 mod synthetic;

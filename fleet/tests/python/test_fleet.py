@@ -1,29 +1,8 @@
 """DuckDB and polars read the files of a fleet, with the sums of the measurement tables that it was made of."""
 
-import os
-import subprocess
-from pathlib import Path
-
 import duckdb
 import polars
 import pytest
-
-PROGRAMS = Path(os.environ["TACTUS_FLEET_PROGRAMS"]).absolute()
-
-
-def run(*args, cwd):
-    done = subprocess.run([str(arg) for arg in args], cwd=cwd, capture_output=True, text=True)
-    assert done.returncode == 0, done
-    return done.stdout
-
-
-@pytest.fixture(scope="session")
-def lab(tmp_path_factory):
-    """A folder with a fleet of two rigs, three days each, and the tables that it was made of."""
-    folder = tmp_path_factory.mktemp("lab")
-    run(PROGRAMS / "examples/synthetic_tables", "tables", 2, 3, 1000, cwd=folder)
-    run(PROGRAMS / "tactus-fleet", "ingest", *sorted(folder.glob("tables/*")), "--to", "fleet", cwd=folder)
-    return folder
 
 
 @pytest.fixture(scope="session")
