@@ -35,9 +35,13 @@ def plain(value):
 
 
 def assert_same(rows, others):
+    """Sums of floats depend on their order, so these may differ in the last digits."""
     assert len(rows) == len(others) > 0
     for row, other in zip(rows, others, strict=True):
-        assert row == pytest.approx({name: plain(value) for name, value in other.items()}, rel=1e-12)
+        assert row.keys() == other.keys()
+        for name, value in other.items():
+            is_float = isinstance(value, float)
+            assert row[name] == (pytest.approx(value, rel=1e-12) if is_float else plain(value)), (name, row, other)
 
 
 def of_duckdb(lab, sql):
@@ -54,7 +58,7 @@ def test_duckdb_answers_the_same(lab, sql):
 @pytest.mark.parametrize("sql", SHARED)
 def test_polars_answers_the_same(lab, sql):
     frames = polars.scan_parquet(f"{lab}/fleet/**/*.parquet", hive_partitioning=True)
-    assert_same(ask(lab, sql), polars.SQLContext(frames=frames).execute(sql, eager=True).to_dicts())
+    assert_same(ask(lab, sql), polars.SQLContext({"frames": frames}).execute(sql, eager=True).to_dicts())
 
 
 def test_an_image_is_the_mean_of_each_element(lab):
