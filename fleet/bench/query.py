@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 RUN_FRAMES = 18_000  # ten minutes
@@ -24,7 +25,7 @@ ELEMENTS = """SELECT rig, element, avg(counts) AS mean FROM
     GROUP BY rig, element ORDER BY rig, element"""
 IMAGES = "SELECT rig, image(counts) AS image FROM frames WHERE phase = 'hold' GROUP BY rig ORDER BY rig"
 RESIDUALS = "SELECT rig, count(*) AS frames, avg(rms(residual)) AS rms FROM predicted('model.toml') WHERE phase = 'hold' GROUP BY rig ORDER BY rig"
-SORT = "SELECT sum(at % 1000 * (t_ns % 1000003)) AS sum FROM (SELECT t_ns, row_number() OVER (ORDER BY counts[18], x_mm, rig, run, t_ns) AS at FROM frames)"
+SORT = "SELECT sum(place % 1000 * (t_ns % 1000003)) AS sum FROM (SELECT t_ns, row_number() OVER (ORDER BY counts[18], x_mm, rig, run, t_ns) AS place FROM frames)"
 
 # Name, SQL of Tactus, SQL of DuckDB.
 QUERIES = [
@@ -40,6 +41,7 @@ DUCKDB = """
 import json, sys, duckdb
 folder, threads, sql = sys.argv[1:]
 con = duckdb.connect(config={"threads": int(threads)})
+con.execute("SET enable_progress_bar = false")
 con.sql(f"CREATE VIEW frames AS SELECT * FROM read_parquet('{folder}/*/*/*.parquet', hive_partitioning = true)")
 rows = con.sql(sql)
 for row in rows.fetchall():
@@ -97,36 +99,31 @@ def limits(files):
     return told
 
 
-def measure(programs, folder, fleet, files, threads):
-    rows = None
-    for name, sql, of_duckdb in QUERIES:
-        ours = [programs / "tactus-fleet", "--json", "--threads", threads, "query", "--at", fleet, sql]
-        theirs = [sys.executable, "-c", DUCKDB, folder / fleet, threads, of_duckdb]
-        answers = {}
-        for engine, command in [("tactus", ours), ("duckdb", theirs)]:
-            if engine == "duckdb" and of_duckdb is None:
-                continue
-            seconds, processor_s, memory_mb, out = timed(command, folder)
-            answers[engine] = [json.loads(line) for line in out.splitlines()]
-            if name == "scan":
-                rows = sum(row["frames"] for row in answers[engine])
-            print(
-                json.dumps(
-                    {
-                        "query": name,
-                        "engine": engine,
-                        "mb": sum(file.stat().st_size for file in files) / 1e6,
-                        "rows": rows,
-                        "seconds": round(seconds, 3),
-                        "rows_per_s": round(rows / seconds),
-                        "cores": round(processor_s / seconds, 2),
-                        "memory_mb": round(memory_mb),
-                    }
-                ),
-                flush=True,
-            )
-        if len(answers) == 2:
-            same(answers["tactus"], answers["duckdb"])
+def measure(programs, folder, fleet, files, threads, query):
+    """One query in one size, asked of both."""
+    name, sql, of_duckdb = query
+    ours = [programs / "tactus-fleet", "--json", "--threads", threads, "query", "--at", fleet, sql]
+    theirs = [sys.executable, "-c", DUCKDB, folder / fleet, threads, of_duckdb]
+    answers = {}
+    for engine, command in [("tactus", ours), ("duckdb", theirs)]:
+        if engine == "duckdb" and of_duckdb is None:
+            continue
+        seconds, processor_s, memory_mb, out = timed(command, folder)
+        answers[engine] = [json.loads(line) for line in out.splitlines()]
+        rows = len(files) * RUN_FRAMES
+        told = {
+            "query": name,
+            "engine": engine,
+            "mb": sum(file.stat().st_size for file in files) / 1e6,
+            "rows": rows,
+            "seconds": round(seconds, 3),
+            "rows_per_s": round(rows / seconds),
+            "cores": round(processor_s / seconds, 2),
+            "memory_mb": round(memory_mb),
+        }
+        print(json.dumps(told), flush=True)
+    if len(answers) == 2:
+        same(answers["tactus"], answers["duckdb"])
 
 
 def main():
@@ -145,9 +142,12 @@ def main():
         subprocess.run([programs / "tactus-fleet", "ingest", *sorted(folder.glob("tables/*")), "--to", "fleet"], cwd=folder, check=True)
         shutil.rmtree(folder / "tables")
         files = sorted((folder / "fleet").glob("*/*/*.parquet"))
-        print(json.dumps(limits(files)), flush=True)
+        # In a process of its own, because the largest memory of a process begins with that of its parent.
+        with ProcessPoolExecutor(1) as pool:
+            print(json.dumps(pool.submit(limits, files).result()), flush=True)
+        sizes = {}
         for runs in sorted(args.runs):
-            part = []
+            sizes[f"fleet-{runs}"] = part = []
             for file in files:
                 # `20260301-000002-rig-0`: the third run of that day.
                 if int(file.name.split("-")[1]) < runs:
@@ -155,7 +155,9 @@ def main():
                     link.parent.mkdir(parents=True, exist_ok=True)
                     link.hardlink_to(file)
                     part.append(link)
-            measure(programs, folder, f"fleet-{runs}", part, args.threads)
+        for query in QUERIES:
+            for fleet, part in sizes.items():
+                measure(programs, folder, fleet, part, args.threads, query)
     finally:
         shutil.rmtree(folder)
 
