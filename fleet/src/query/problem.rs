@@ -21,16 +21,18 @@ struct Problem {
 
 /// What is wrong with a query, in words.
 pub(super) async fn in_words(error: DataFusionError, place: &Place, sql: &str) -> anyhow::Error {
-    match error.find_root() {
-        // The causes are in the error itself.
-        DataFusionError::External(_) => anyhow::Error::new(error),
-        // The library does not say in which file.
-        DataFusionError::ParquetError(_) => match Described::all(place).await {
-            Ok(_) => anyhow::Error::new(error),
-            Err(unreadable) => anyhow::Error::new(unreadable),
-        },
-        root => anyhow::Error::new(Problem::of(root, error.diagnostic(), sql)),
+    let root = error.find_root();
+    // The library does not say in which file.
+    if matches!(root, DataFusionError::ParquetError(_))
+        && let Err(unreadable) = Described::all(place).await
+    {
+        return anyhow::Error::new(unreadable);
     }
+    // The causes are in the error itself.
+    if matches!(root, DataFusionError::External(_)) {
+        return anyhow::Error::new(error);
+    }
+    anyhow::Error::new(Problem::of(root, error.diagnostic(), sql))
 }
 
 impl Problem {
