@@ -60,7 +60,7 @@ pub enum Outside {
 impl Bounds {
     /// The bounds of a rig that has a service part, for a covering.
     pub fn new(rig: &Rig, envelope: &Envelope, motion: &Motion, covering: Covering) -> Self {
-        Self { envelope: envelope.clone(), motion: motion.clone(), covering, registration: rig.registration }
+        Self { envelope: envelope.clone(), motion: *motion, covering, registration: rig.registration }
     }
 
     /// The same bounds with another covering in place.

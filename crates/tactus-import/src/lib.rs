@@ -102,7 +102,9 @@ pub fn import<P: AsRef<Path>>(
     let elements = mapping.counts.columns.of_array(rows, cols).map_err(|wrong| wrong.in_file(map))?;
     let (mut imported, mut warnings): (Vec<Run>, Vec<String>) = (Vec::new(), Vec::new());
     for cost in [1.0, WRITING] {
-        files.iter().for_each(|path| meter::will_read(path, &[cost]));
+        for path in files {
+            meter::will_read(path, &[cost]);
+        }
     }
     for path in files.iter().map(AsRef::as_ref) {
         let file = runs::of_file(&Columns::read(path, &mapping.form)?, &mapping, &elements)?;

@@ -73,7 +73,8 @@ impl Meter {
         while let Some(pass) = passes.get(over).filter(|pass| read >= pass.bytes) {
             (over, read) = (over + 1, read - pass.bytes);
         }
-        (self.over.set(over), self.read.set(read));
+        self.over.set(over);
+        self.read.set(read);
         let whole: f64 = passes.iter().map(Pass::length).sum();
         let done: f64 = passes[..over].iter().map(Pass::length).sum();
         let present = passes.get(over).map_or(0.0, |pass| read as f64 * pass.cost);

@@ -36,7 +36,7 @@ impl Limits {
     pub(crate) fn new(rig: &Rig, service: &Service) -> Self {
         Self {
             envelope: service.envelope.clone(),
-            motion: service.motion.clone(),
+            motion: service.motion,
             depth_max_mm: service.envelope.depth_max_mm(rig.covering),
             sample_period_s: 1.0 / rig.array.rate_hz(),
         }

@@ -107,7 +107,7 @@ impl Run {
         height_mm: Option<f64>,
         speed_mm_per_s: Option<f64>,
     ) -> Result<Reply, Broken> {
-        let motion = self.shared.service.motion.clone();
+        let motion = self.shared.service.motion;
         let to_mm = self.shared.rig.registration.to_robot([to.x_mm, to.y_mm]);
         let z_mm = height_mm.unwrap_or(motion.safe_height_mm);
         self.note_travel(to_mm, z_mm);
@@ -147,7 +147,7 @@ impl Run {
     }
 
     async fn press_once(&mut self, press: &Press, index: i32) -> Result<Vec<MeanReading>, Broken> {
-        let motion = self.shared.service.motion.clone();
+        let motion = self.shared.service.motion;
         let at_mm = self.shared.rig.registration.to_robot([press.at.x_mm, press.at.y_mm]);
         let speed_mm_per_s = press.speed_mm_per_s.unwrap_or(motion.load_speed_mm_per_s);
         self.note_travel(at_mm, motion.safe_height_mm);
@@ -237,7 +237,7 @@ impl Run {
 
     /// As [`Self::recover`], and goes back to where the tip was.
     async fn recover_in_place(&mut self) -> Result<(), Broken> {
-        let motion = self.shared.service.motion.clone();
+        let motion = self.shared.service.motion;
         let [x_mm, y_mm, z_mm] = self.shared.position_mm();
         if z_mm >= motion.safe_height_mm - motion.tolerance_mm {
             return self.shared.await_the_sensors_return().await;

@@ -31,7 +31,9 @@ pub(crate) fn info(common: &Common, files: &[PathBuf]) -> anyhow::Result<Exit> {
 /// Reads each of the files once.
 fn reading<T>(common: &Common, files: &[PathBuf], job: impl FnOnce() -> T) -> T {
     Busy::with("reading", common.json).reads(|| {
-        files.iter().for_each(|file| meter::will_read(file, &[1.0]));
+        for file in files {
+            meter::will_read(file, &[1.0]);
+        }
         job()
     })
 }
