@@ -7,16 +7,21 @@ use comfy_table::{ColumnConstraint, ContentArrangement, Table, Width};
 
 /// Prints `name  value` lines with the values aligned.
 pub(crate) fn print_fields(fields: &[(&str, String)]) {
-    let width = fields.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    for (name, value) in fields {
-        say(&format!("{name:width$}  {value}"));
+    for line in aligned(fields) {
+        say(&line);
     }
+}
+
+fn aligned<'a>(fields: &'a [(&str, String)]) -> impl Iterator<Item = String> + 'a {
+    let width = fields.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    fields.iter().map(move |(name, value)| format!("{name:width$}  {value}"))
 }
 
 /// Space between two columns of a table.
 const GAP: usize = 2;
 
-/// Prints a table with a header. At a terminal it is as wide as that at most: long cells go on in further lines.
+/// Prints a table with a header. At a terminal it is as wide as that at most: long cells go on in further lines; if not even their longest
+/// words fit side by side, each row is a paragraph.
 pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
     say(&table(header, rows, terminal_columns()));
 }
@@ -29,16 +34,19 @@ pub(crate) fn terminal_columns() -> Option<usize> {
 }
 
 fn table(header: &[&str], rows: &[Vec<String>], columns: Option<usize>) -> String {
-    let mut table = Table::new();
-    table.load_style(NOTHING).set_header(header).add_rows(rows);
-    // No word is divided: somebody may want to copy it. A table whose words do not fit is left to the terminal.
+    // No word is divided: somebody may want to copy it.
     let longest = |column: usize| {
         let cells = rows.iter().filter_map(|row| row.get(column)).map(String::as_str);
         let words = cells.chain([header[column]]).flat_map(str::split_whitespace);
         words.map(|word| word.chars().count() + GAP).max().unwrap_or(GAP)
     };
     let least: Vec<usize> = (0..header.len()).map(longest).collect();
-    if let Some(columns) = columns.filter(|columns| least.iter().sum::<usize>() <= *columns) {
+    if columns.is_some_and(|columns| least.iter().sum::<usize>() > columns) {
+        return paragraphs(header, rows);
+    }
+    let mut table = Table::new();
+    table.load_style(NOTHING).set_header(header).add_rows(rows);
+    if let Some(columns) = columns {
         let in_cells = |width: usize| u16::try_from(width).unwrap_or(u16::MAX);
         table.set_content_arrangement(ContentArrangement::Dynamic).set_width(in_cells(columns));
         let at_least = |width: &usize| ColumnConstraint::LowerBoundary(Width::Fixed(in_cells(*width)));
@@ -48,6 +56,16 @@ fn table(header: &[&str], rows: &[Vec<String>], columns: Option<usize>) -> Strin
         column.set_padding((0, 2));
     }
     table.trim_fmt()
+}
+
+/// The cells of each row below each other, with their names; none of what is empty.
+fn paragraphs(header: &[&str], rows: &[Vec<String>]) -> String {
+    let paragraph = |row: &Vec<String>| {
+        let cells = header.iter().copied().zip(row.iter().cloned());
+        let told: Vec<_> = cells.filter(|(_, cell)| !cell.is_empty()).collect();
+        aligned(&told).collect::<Vec<_>>().join("\n")
+    };
+    rows.iter().map(paragraph).collect::<Vec<_>>().join("\n\n")
 }
 
 /// Prints a line. If the reader closed the pipe, as `head` does, the program continues.

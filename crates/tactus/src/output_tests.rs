@@ -23,6 +23,7 @@ fn a_table_is_aligned_and_ends_at_the_edge() {
     assert_eq!(lines, "RIG   WHAT\nleft  idle\nb     a long story");
     let narrow = table(&["RIG", "WHAT"], &rows, Some(16));
     assert_eq!(narrow, "RIG   WHAT\nleft  idle\nb     a long\n      story");
-    // No room for the longest words: they stay whole.
-    assert_eq!(table(&["RIG", "WHAT"], &rows, Some(12)), lines);
+    // No room for the longest words side by side.
+    let paragraphs = table(&["RIG", "WHAT"], &rows, Some(10));
+    assert_eq!(paragraphs, "RIG   left\nWHAT  idle\n\nRIG   b\nWHAT  a long story");
 }
