@@ -1,7 +1,7 @@
 //! The commands and their arguments.
 
 use std::{
-    fs,
+    fs, io,
     num::NonZeroUsize,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -15,6 +15,7 @@ use serde::Serialize;
 use tactus_report::fleet::{FleetReport, Trend, fleet_html};
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
+use tokio::sync::oneshot;
 
 use crate::{
     IngestOptions, Place,
@@ -180,11 +181,12 @@ fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs
 fn run_query(runtime: Runtime, common: &Common, args: &QueryArgs) -> anyhow::Result<Exit> {
     let place = Place::at(&args.fleet.at)?;
     let spill = spill_folder(args.spill.as_deref())?;
+    let interrupted = interrupted()?;
     let asked = runtime.block_on(async {
         tokio::select! {
             asked = ask(&place, spill.path(), common, args) => asked,
-            interrupted = tokio::signal::ctrl_c() => {
-                interrupted.context("signals cannot be received")?;
+            interrupted = interrupted => {
+                interrupted?.context("signals cannot be received")?;
                 bail!("stopped by Ctrl-C; nothing is left behind")
             }
         }
@@ -192,6 +194,17 @@ fn run_query(runtime: Runtime, common: &Common, args: &QueryArgs) -> anyhow::Res
     // A thread in the middle of a join would go on until it has a row.
     runtime.shutdown_background();
     asked
+}
+
+/// Tells of Ctrl-C. On a thread and a runtime of its own, because a join may keep all threads of the query's runtime from looking for signals.
+fn interrupted() -> anyhow::Result<oneshot::Receiver<io::Result<()>>> {
+    let (tell, told) = oneshot::channel();
+    let signals = tokio::runtime::Builder::new_current_thread().enable_io().build()?;
+    thread::Builder::new().name("signals".into()).spawn(move || {
+        // The query may be over already.
+        drop(tell.send(signals.block_on(tokio::signal::ctrl_c())));
+    })?;
+    Ok(told)
 }
 
 /// A folder of the query's own, which disappears with it.
