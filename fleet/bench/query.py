@@ -14,7 +14,8 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-RUN_FRAMES = 18_000  # ten minutes
+from measure import RUN_FRAMES, timed
+
 DAYS = 28
 RIGS = 4
 
@@ -47,19 +48,6 @@ rows = con.sql(sql)
 for row in rows.fetchall():
     print(json.dumps(dict(zip(rows.columns, row)), default=str))
 """
-
-
-def timed(command, folder):
-    """Wall seconds, processor seconds, largest memory in MB, and what a process printed."""
-    begun = time.perf_counter()
-    with tempfile.TemporaryFile("w+") as out:
-        child = subprocess.Popen([str(word) for word in command], cwd=folder, stdout=out)
-        _, status, usage = os.wait4(child.pid, 0)
-        seconds = time.perf_counter() - begun
-        if status != 0:
-            sys.exit(f"{command} failed")
-        out.seek(0)
-        return seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024, out.read()
 
 
 def same(one, other):

@@ -1,10 +1,12 @@
 //! How far a job is with the files that it reads.
 //!
-//! A job says beforehand which files it will read, how often, and how long that takes in comparison; what this crate reads is then counted. The job runs on the thread that asked for it,
-//! and the meter is that thread's: the functions that read files neither know of meters nor pass them on.
+//! A job says beforehand which files it will read, how often, and how long that takes in comparison; what this crate reads is then
+//! counted. The job runs on the thread that asked for it, and the meter is that thread's: the functions that read files neither know of
+//! meters nor pass them on.
 
 use std::{
     cell::{Cell, RefCell},
+    collections::VecDeque,
     fmt,
     fs::{self, File},
     io::{self, Read},
@@ -18,12 +20,13 @@ thread_local! {
 
 /// Counts what one job reads.
 struct Meter {
-    /// What it will read, in order.
-    passes: RefCell<Vec<Pass>>,
-    /// Number of passes that are over.
-    over: Cell<usize>,
+    /// What it will still read, in order: the present pass first.
+    passes: RefCell<VecDeque<Pass>>,
     /// Bytes that were read in the present one.
     read: Cell<u64>,
+    /// Length of all passes, and of those that are over.
+    whole: Cell<f64>,
+    over: Cell<f64>,
     tell: Box<dyn Fn(f64)>,
 }
 
@@ -39,8 +42,9 @@ struct Pass {
 pub fn metered<T>(tell: impl Fn(f64) + 'static, job: impl FnOnce() -> T) -> T {
     let meter = Meter {
         passes: RefCell::default(),
-        over: Cell::default(),
         read: Cell::default(),
+        whole: Cell::default(),
+        over: Cell::default(),
         tell: Box::new(tell),
     };
     let _outer = Outer(METER.replace(Some(Rc::new(meter))));
@@ -53,7 +57,11 @@ pub fn will_read(path: impl AsRef<Path>, costs: &[f64]) {
     with(|meter| {
         // A file that is not there is its reader's to tell.
         let bytes = fs::metadata(path).map_or(0, |file| file.len());
-        meter.passes.borrow_mut().extend(costs.iter().map(|cost| Pass { bytes, cost: *cost }));
+        for cost in costs {
+            let pass = Pass { bytes, cost: *cost };
+            meter.whole.set(meter.whole.get() + pass.length());
+            meter.passes.borrow_mut().push_back(pass);
+        }
     });
 }
 
@@ -64,23 +72,19 @@ pub fn count(bytes: u64) {
 
 impl Meter {
     fn count(&self, bytes: u64) {
-        let passes = self.passes.borrow();
-        // What is read before is in none of them.
-        if passes.is_empty() {
+        // What is read before anything is announced is in no pass.
+        if self.whole.get() <= 0.0 {
             return;
         }
-        let (mut over, mut read) = (self.over.get(), self.read.get() + bytes);
-        while let Some(pass) = passes.get(over).filter(|pass| read >= pass.bytes) {
-            (over, read) = (over + 1, read - pass.bytes);
+        let mut passes = self.passes.borrow_mut();
+        let mut read = self.read.get() + bytes;
+        while let Some(pass) = passes.pop_front_if(|pass| read >= pass.bytes) {
+            read -= pass.bytes;
+            self.over.set(self.over.get() + pass.length());
         }
-        self.over.set(over);
         self.read.set(read);
-        let whole: f64 = passes.iter().map(Pass::length).sum();
-        let done: f64 = passes[..over].iter().map(Pass::length).sum();
-        let present = passes.get(over).map_or(0.0, |pass| read as f64 * pass.cost);
-        if whole > 0.0 {
-            (self.tell)(((done + present) / whole).min(1.0));
-        }
+        let present = passes.front().map_or(0.0, |pass| read as f64 * pass.cost);
+        (self.tell)(((self.over.get() + present) / self.whole.get()).min(1.0));
     }
 }
 

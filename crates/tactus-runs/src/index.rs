@@ -89,37 +89,34 @@ impl Index {
     pub(crate) fn renewed(&self, folder: &Path) -> Result<(Self, Vec<String>), RunsError> {
         let (mut files, mut unreadable) = (Vec::new(), Vec::new());
         search(folder, DEPTH_MAX, &mut files)?;
-        for file in files.iter().filter(|file| self.fresh(folder, file).is_none()) {
-            meter::will_read(file, &[1.0]);
-        }
         let mut now = Self { schema: SCHEMA.to_owned(), recordings: BTreeMap::new() };
-        let mut is_news = false;
+        let mut changed = Vec::new();
         for file in files {
-            let Some((bytes, modified_ns)) = state_of(&file) else { continue };
-            let known = if let Some(Known { entry, .. }) = self.fresh(folder, &file).cloned() {
-                Known { bytes, modified_ns, entry: RunEntry { path: file.clone(), ..entry } }
+            let Some(state) = state_of(&file) else { continue };
+            let key = file.strip_prefix(folder).unwrap_or(&file).to_owned();
+            let known = self.recordings.get(&key);
+            if let Some(known) = known.filter(|known| (known.bytes, known.modified_ns) == state).cloned() {
+                let entry = RunEntry { path: file, ..known.entry };
+                now.recordings.insert(key, Known { entry, ..known });
             } else {
-                is_news = true;
-                match tactus_record::info(&file) {
-                    Ok(info) => Known { bytes, modified_ns, entry: RunEntry::of(file.clone(), info) },
-                    Err(error) => {
-                        unreadable.push(error.to_string());
-                        continue;
-                    }
+                meter::will_read(&file, &[1.0]);
+                changed.push((key, file, state));
+            }
+        }
+        let is_news = !changed.is_empty();
+        for (key, file, (bytes, modified_ns)) in changed {
+            match tactus_record::info(&file) {
+                Ok(info) => {
+                    let entry = RunEntry::of(file, info);
+                    now.recordings.insert(key, Known { bytes, modified_ns, entry });
                 }
-            };
-            now.recordings.insert(key_of(folder, &file), known);
+                Err(error) => unreadable.push(error.to_string()),
+            }
         }
         if is_news || now.recordings.len() != self.recordings.len() {
             keep(&folder.join(INDEX), &now);
         }
         Ok((now, unreadable))
-    }
-
-    /// What is known of a recording, if it has not changed since.
-    fn fresh(&self, folder: &Path, file: &Path) -> Option<&Known> {
-        let state = state_of(file)?;
-        self.recordings.get(&key_of(folder, file)).filter(|known| (known.bytes, known.modified_ns) == state)
     }
 
     /// The runs in the order of their start.
@@ -128,10 +125,6 @@ impl Index {
         entries.sort_by(|one, other| (&one.started, &one.run_id).cmp(&(&other.started, &other.run_id)));
         entries
     }
-}
-
-fn key_of(folder: &Path, file: &Path) -> PathBuf {
-    file.strip_prefix(folder).unwrap_or(file).to_owned()
 }
 
 /// Without it everything is read again, so a folder that cannot be written costs only time.

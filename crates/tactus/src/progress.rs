@@ -244,7 +244,8 @@ impl ComputationProgress {
     }
 }
 
-/// Work of unknown length: what it is, and the time so far. While it reads files ([`Busy::reads`]), the share of them and the time left. Hidden where [`RunProgress`] is; ends with this.
+/// Work of unknown length: what it is, and the time so far. While it reads files ([`Busy::reads`]), the share of them and the time left.
+/// Hidden where [`RunProgress`] is; ends with this.
 #[derive(Debug)]
 pub(crate) struct Busy(ProgressBar);
 
