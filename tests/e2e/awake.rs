@@ -4,9 +4,8 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::thread;
-use std::time::Instant;
 
-use tactus_e2e::{DEADLINE, ServiceUnderTest};
+use tactus_e2e::{ServiceUnderTest, until};
 
 const CLIENT: &str = "#!/bin/sh
 echo \"$@\" >> inhibitor
@@ -31,14 +30,9 @@ fn the_machine_is_kept_awake_during_a_run_and_only_then() {
     fs::write(&absent, CLIENT).unwrap();
     fs::set_permissions(&absent, fs::Permissions::from_mode(0o755)).unwrap();
     assert_eq!(lab.tactus(&["run", &script, "--no-report"]).code, Some(0));
-    let deadline = Instant::now() + DEADLINE;
-    let said = loop {
-        let said = fs::read_to_string(&told).unwrap_or_default();
-        if said.contains("released") {
-            break said;
-        }
-        assert!(Instant::now() < deadline, "{said}");
+    let said = until("the client is released", || {
         thread::yield_now();
-    };
+        fs::read_to_string(&told).ok().filter(|said| said.contains("released"))
+    });
     assert_eq!(said, "--what=sleep --mode=block --who=tactusd --why=a run is in progress cat\nreleased\n");
 }

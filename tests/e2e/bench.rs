@@ -19,6 +19,7 @@ use tactus_schema::pb;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 use tokio::task::JoinHandle;
+use tokio::time::timeout;
 
 /// Name of the rig.
 pub(crate) const RIG: &str = "bench";
@@ -199,7 +200,7 @@ impl Bench {
         let endpoint = Endpoint::from_str(&self.endpoint).unwrap();
         let deadline = Instant::now() + DEADLINE;
         loop {
-            let held = self.runtime.block_on(async {
+            let held = within(&self.runtime, async {
                 let client = Client::connect(&endpoint, Some(RIG)).await.ok()?;
                 match client.hold("trials", Some("the next trial")).await.ok()? {
                     Hold::Held(held) => Some((Arc::new(client), held)),
@@ -232,7 +233,7 @@ impl Bench {
 
     /// Sends a command, and waits for the answer.
     pub(crate) fn command(&self, command: Command) -> pb::CommandReply {
-        self.runtime.block_on(self.send(command)).unwrap().unwrap()
+        within(&self.runtime, self.send(command)).unwrap().unwrap()
     }
 
     /// Clears the fault and homes, as a person does: on a busy machine not always at once.
@@ -294,13 +295,13 @@ impl Bench {
             lease: held.secret(),
             continue_run: String::new(),
         };
-        self.runtime.block_on(client.command(Command::Run, &request, DEADLINE)).unwrap()
+        within(&self.runtime, client.command(Command::Run, &request, DEADLINE)).unwrap()
     }
 
     /// Follows what the service publishes of one kind.
     pub(crate) fn subscribe<M: Published>(&self) -> Subscription<M> {
         let (client, _) = self.commander.as_ref().expect("who commands");
-        self.runtime.block_on(client.subscribe(History::None)).unwrap()
+        within(&self.runtime, client.subscribe(History::None)).unwrap()
     }
 
     /// Asks for the status until `is_it`.
@@ -443,6 +444,11 @@ impl StageLine {
     pub(crate) fn forget(&self) {
         while self.seen.try_recv().is_ok() {}
     }
+}
+
+/// Waits for what a future gives; only a hang takes as long as the deadline.
+pub(crate) fn within<T>(runtime: &Runtime, future: impl Future<Output = T>) -> T {
+    runtime.block_on(async { timeout(DEADLINE, future).await }).unwrap()
 }
 
 /// A plain client of the bus.

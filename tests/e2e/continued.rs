@@ -5,10 +5,9 @@ use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use rustix::process::Signal;
-use tactus_e2e::{DEADLINE, Process, ServiceUnderTest, tactus};
+use tactus_e2e::{Process, ServiceUnderTest, tactus, until};
 use tactus_record::{Entry, Message, confirmed_presses, rows};
 use tactus_schema::pb::{self, run_event::Event};
 use tempfile::TempDir;
@@ -168,13 +167,7 @@ fn a_killed_run_of_the_embedded_rig_goes_on_in_its_folder() {
     let embedded =
         Process::start("tactus", folder.path(), &["run", "five.star", "--embedded", "--real-time"]);
     let runs = folder.path().join("runs");
-    let deadline = Instant::now() + DEADLINE;
-    let first = loop {
-        if let Some(path) = in_press(&runs, 1) {
-            break path;
-        }
-        assert!(Instant::now() < deadline, "nothing was pressed");
-    };
+    let first = until("a press", || in_press(&runs, 1));
     embedded.signal(Signal::KILL);
     assert_eq!(embedded.wait().0, None);
     let confirmed = presses(&first);

@@ -7,15 +7,17 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{DEADLINE, Link, Process, binary, free_endpoint, repository, tactus};
+use tactus_e2e::{Link, Process, binary, free_endpoint, repository, tactus, until};
 use tactus_record::{Entry, Message, Timeline};
 use tactus_schema::pb::run_event::Event;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
+
+use crate::bench::within;
 
 /// Time between two looks at files that grow.
 const AGAIN: Duration = Duration::from_millis(100);
@@ -82,7 +84,7 @@ fn router(runtime: &Runtime) -> (zenoh::Session, String) {
     config.insert_json5("mode", "\"router\"").unwrap();
     config.insert_json5("scouting/multicast/enabled", "false").unwrap();
     config.insert_json5("listen/endpoints", &format!("[\"{endpoint}\"]")).unwrap();
-    (runtime.block_on(async { zenoh::open(config).await.unwrap() }), endpoint)
+    (within(runtime, async { zenoh::open(config).await.unwrap() }), endpoint)
 }
 
 fn collect(folder: &Path, endpoint: &str, args: &[&str]) -> Process {
@@ -132,16 +134,15 @@ fn recorded(files: &[PathBuf]) -> (Vec<u64>, u64) {
 
 /// Returns once the rig's collected files have that frame.
 fn wait_until_collected(folder: &Path, rig: &str, seq: u64) {
-    let until = Instant::now() + DEADLINE;
     let collected = folder.join("collected").join(rig);
     // A file that is just being created is no recording yet.
     let has = |file: &PathBuf| {
         tactus_record::read(file).is_ok() && recorded(std::slice::from_ref(file)).0.last() >= Some(&seq)
     };
-    while !recordings(&collected).last().is_some_and(has) {
-        assert!(Instant::now() < until, "frame {seq} of {rig} is not collected");
+    until(&format!("frame {seq} of {rig} is collected"), || {
         std::thread::sleep(AGAIN);
-    }
+        recordings(&collected).last().is_some_and(has).then_some(())
+    });
 }
 
 /// All frames that the files have, each once and in order; what is missing between them.
@@ -300,7 +301,8 @@ fn two_rigs_of_one_name_are_named_and_neither_is_recorded() {
     let _daemons = hosts.each_ref().map(Host::serve);
     // Both have joined the router once it refuses the name.
     let status = ["--endpoint", &router, "--rig", "twin", "status"];
-    while !tactus(folder.path(), &status).err.contains("several programs") {}
+    let refused = || tactus(folder.path(), &status).err.contains("several programs");
+    until("the name is refused", || refused().then_some(()));
     let mut collector = collect(folder.path(), &router, &[]);
     collector.wait_for("several programs");
     let (code, totals) = ended(collector, "twin");
@@ -425,8 +427,8 @@ fn a_host_that_is_cut_off_for_half_a_minute_loses_nothing_that_is_kept_and_nothi
         fs::write(host.folder.path().join("reads.star"), "def run(rig):\n    tare()\n    wait(75.0)\n")
             .unwrap();
         // The service has joined the router by now or does so soon.
-        while in_lab(&binary("tactus"), &["--endpoint", ROUTER, "status", "--rig", rig]).wait().0 != Some(0) {
-        }
+        let status = ["--endpoint", ROUTER, "status", "--rig", rig];
+        until("it has joined", || (in_lab(&binary("tactus"), &status).wait().0 == Some(0)).then_some(()));
         let args = [&["--endpoint", ROUTER], &COLLECT[..], &[rig]].concat();
         let mut collector = in_lab(&binary("tactus"), &args);
         collector.wait_for("found");

@@ -12,7 +12,7 @@ use tactus_schema::pb;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
-use crate::bench::small_rig;
+use crate::bench::{small_rig, within};
 
 /// Frames that the tests see before and after a rig dies.
 const FRAMES: usize = 15;
@@ -63,7 +63,7 @@ impl Lab {
 
     fn client(&self, runtime: &Runtime, rig: &str) -> Client {
         let endpoint: Endpoint = self.endpoint.parse().unwrap();
-        runtime.block_on(Client::connect(&endpoint, Some(rig))).unwrap()
+        within(runtime, Client::connect(&endpoint, Some(rig))).unwrap()
     }
 
     /// The rig in the table of `status`.
@@ -139,13 +139,13 @@ fn devices_that_die_harm_no_other_rig_and_are_found_again() {
     let runtime = Runtime::new().unwrap();
     let clients = ["left", "right", "middle"].map(|rig| lab.client(&runtime, rig));
     let [mut left, mut right] = [&clients[0], &clients[1]]
-        .map(|client| runtime.block_on(client.subscribe::<pb::Frame>(History::None)).unwrap());
-    let mut seen = [&mut left, &mut right].map(|frames_of| runtime.block_on(frames(frames_of, FRAMES)));
+        .map(|client| within(&runtime, client.subscribe::<pb::Frame>(History::None)).unwrap());
+    let mut seen = [&mut left, &mut right].map(|frames_of| within(&runtime, frames(frames_of, FRAMES)));
 
     middle.kill();
     daemon.wait_until(|line| line.contains("rig{name=\"middle\"}") && line.contains("sensor lost"));
     for (seqs, frames_of) in seen.iter_mut().zip([&mut left, &mut right]) {
-        seqs.extend(runtime.block_on(frames(frames_of, FRAMES)));
+        seqs.extend(within(&runtime, frames(frames_of, FRAMES)));
         assert_unbroken(seqs);
     }
     assert_eq!(lab.status("middle")["problem"], "sensor and stage do not answer");
@@ -162,8 +162,8 @@ fn devices_that_die_harm_no_other_rig_and_are_found_again() {
 
     // It is tried again until it is there.
     let _middle = lab.mock("middle");
-    let mut health = runtime.block_on(clients[2].subscribe::<pb::Health>(History::None)).unwrap();
-    while !runtime.block_on(health.recv()).expect("the service tells").problem.is_empty() {}
+    let mut health = within(&runtime, clients[2].subscribe::<pb::Health>(History::None)).unwrap();
+    within(&runtime, async { while !health.recv().await.expect("the service tells").problem.is_empty() {} });
 
     // A stop without a name is for all of them.
     let stopped = lab.tactus(&["stop", "--json"]);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{Process, ServiceUnderTest, free_endpoint, repository, tactus};
+use tactus_e2e::{Process, ServiceUnderTest, free_endpoint, repository, tactus, until};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb::{self, run_event::Event};
 
@@ -225,12 +225,8 @@ fn stop_pause_and_resume_work_from_another_client() {
     assert_eq!(pause.code, Some(0));
     let pauses = ["pauses before its next step", "paused: `tactus resume` goes on"];
     assert!(pauses.iter().any(|words| pause.out.contains(words)), "{pause:?}");
-    let paused = loop {
-        let status = status(&lab);
-        if status["run"]["phase"] == "paused" {
-            break status;
-        }
-    };
+    let paused =
+        until("it is paused", || Some(status(&lab)).filter(|status| status["run"]["phase"] == "paused"));
     assert!(paused["stage"]["z_mm"].as_f64().unwrap() > 1.9, "a paused rig presses nothing: {paused}");
     assert_eq!(lab.tactus(&["run", &script]).code, Some(5), "one run at a time");
     let resumed = lab.tactus(&["resume"]);

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use tactus_e2e::{CommandOutput, Process, ServiceUnderTest, free_endpoint, repository, tactus};
+use tactus_e2e::{CommandOutput, Process, ServiceUnderTest, free_endpoint, repository, tactus, until};
 use tempfile::TempDir;
 
 const ZABER: &str = "protocol = \"zaber-ascii\"
@@ -153,7 +153,8 @@ fn a_service_of_another_rig_holds_another_stage() {
     let mut daemon = Process::start("tactusd", folder.path(), &["--config", "tactusd.toml"]);
     daemon.wait_for("tactusd starts");
     // It answers soon after that line.
-    while tactus(folder.path(), &["--endpoint", &endpoint, "--rig", "other", "status"]).code != Some(0) {}
+    let status = ["--endpoint", &endpoint, "--rig", "other", "status"];
+    until("an answer", || (tactus(folder.path(), &status).code == Some(0)).then_some(()));
     let check = ["--endpoint", &endpoint, "stage", "check", "--rig", "rig.toml", "--home", "--yes"];
     let said = tactus(folder.path(), &check);
     assert_eq!(said.code, Some(0), "{said:?}");

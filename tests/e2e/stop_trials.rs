@@ -27,7 +27,7 @@ use tactus_schema::key::Command;
 use tactus_schema::pb;
 use tokio::task::JoinHandle;
 
-use crate::bench::{Bench, Options, Seen, number, raw_session, small_rig, trials};
+use crate::bench::{Bench, Options, Seen, number, raw_session, small_rig, trials, within};
 use crate::disk::Disk;
 
 /// A run takes its own first zero; another tare would only take time.
@@ -227,9 +227,9 @@ impl Scene {
         });
         let dashboard = Dashboard::start(&bench, condition != Condition::NoSensor);
         let relay = Relay::to(&bench.endpoint);
-        let session = bench.runtime.block_on(raw_session(&bench.endpoint));
+        let session = within(&bench.runtime, raw_session(&bench.endpoint));
         let rogue = (condition == Condition::Rogue).then(|| {
-            bench.runtime.block_on(async {
+            within(&bench.runtime, async {
                 let rogue = raw_session(&bench.endpoint).await;
                 for key in ["tactus/stop", "tactus/bench/cmd/stop", "tactus/**"] {
                     rogue.declare_queryable(key).callback(drop).background().await.unwrap();
@@ -307,7 +307,7 @@ impl Scene {
             Surface::Bus => {
                 let replies = self.session.get("tactus/stop").payload(Vec::new()).express(true);
                 // The answer is not waited for.
-                drop(self.bench.runtime.block_on(async { replies.await }).unwrap());
+                drop(within(&self.bench.runtime, async { replies.await }).unwrap());
             }
             Surface::Datagram => {
                 let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -338,13 +338,13 @@ impl Scene {
             assert_eq!(code, Some(0), "{said}");
             self.resetting = None;
             self.bench.restart();
-            self.session = self.bench.runtime.block_on(raw_session(&self.bench.endpoint));
+            self.session = within(&self.bench.runtime, raw_session(&self.bench.endpoint));
             self.make_ready();
             return;
         }
         match (self.resetting.take(), self.condition) {
             (Some(reset), _) => {
-                let reply = self.bench.runtime.block_on(reset).unwrap().unwrap();
+                let reply = within(&self.bench.runtime, reset).unwrap().unwrap();
                 assert!(!reply.ok, "homing was stopped");
             }
             // The first report may be older than the controller's restart.
@@ -366,7 +366,7 @@ impl Drop for Scene {
         self.bench.end();
         let sessions = [Some(self.session.clone()), self.rogue.take()];
         for session in sessions.into_iter().flatten() {
-            drop(self.bench.runtime.block_on(async { session.close().await }));
+            drop(within(&self.bench.runtime, async { session.close().await }));
         }
     }
 }

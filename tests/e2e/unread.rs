@@ -2,10 +2,9 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::path::Path;
-use std::time::Instant;
 
 use rustix::process::Signal;
-use tactus_e2e::{DEADLINE, Process, ServiceUnderTest};
+use tactus_e2e::{Process, ServiceUnderTest, until};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb::{Phase, run_event::Event};
 use tempfile::TempDir;
@@ -86,16 +85,11 @@ fn an_embedded_run_at_a_held_terminal_stops_when_that_is_closed() {
     std::fs::write(folder.path().join("hold.star"), hold).unwrap();
     let args = ["run", "hold.star", "--embedded", "--real-time", "--no-report"];
     let run = Process::start_at_held_terminal("tactus", folder.path(), &args);
-    let deadline = Instant::now() + DEADLINE;
     // It can say nothing; what it records is the sign that it presses.
-    let recording = loop {
-        let run = std::fs::read_dir(folder.path().join("runs")).ok().and_then(|mut runs| runs.next());
-        let recording = run.map(|run| run.unwrap().path().join("recording.mcap"));
-        if let Some(recording) = recording.filter(|path| holds(path)) {
-            break recording;
-        }
-        assert!(Instant::now() < deadline, "it does not press");
-    };
+    let recording = until("it presses", || {
+        let run = std::fs::read_dir(folder.path().join("runs")).ok()?.next()?;
+        Some(run.unwrap().path().join("recording.mcap")).filter(|path| holds(path))
+    });
     run.signal(Signal::HUP);
     let (code, said) = run.wait();
     assert_eq!(code, Some(1), "{said}");

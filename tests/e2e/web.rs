@@ -17,7 +17,7 @@ use tokio::runtime::Runtime;
 use tokio::time::interval;
 use zenoh::bytes::Encoding;
 
-use crate::bench::raw_session;
+use crate::bench::{raw_session, within};
 
 const HOLD: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 600.0)\n";
 
@@ -271,7 +271,7 @@ fn frames_of_another_publisher_are_not_shown() {
     let web = Web::start(&lab, &lab.endpoint);
     web.until(|view| view["frame"].is_object());
     let runtime = Runtime::new().unwrap();
-    let rogue = runtime.block_on(raw_session(&lab.endpoint));
+    let rogue = within(&runtime, raw_session(&lab.endpoint));
     let is_shown = Arc::new(AtomicBool::new(false));
     let publishing = runtime.spawn({
         let is_shown = Arc::clone(&is_shown);
@@ -294,7 +294,7 @@ fn frames_of_another_publisher_are_not_shown() {
         views.get() == 80
     });
     is_shown.store(true, Ordering::SeqCst);
-    runtime.block_on(publishing).unwrap();
+    within(&runtime, publishing).unwrap();
 }
 
 #[test]

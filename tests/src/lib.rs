@@ -15,7 +15,7 @@ use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::mpsc::{self, Receiver};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -31,6 +31,23 @@ pub use terminal::Terminal;
 
 /// Only a hang takes this long.
 pub const DEADLINE: Duration = Duration::from_mins(2);
+
+/// Only a computation that hangs takes this long, however slow the machine is.
+const COMPUTATION_DEADLINE: Duration = Duration::from_mins(15);
+
+/// Asks until there is an answer, and returns it. Nothing is waited for between two questions: each takes its time.
+///
+/// # Panics
+/// If none comes before the deadline.
+pub fn until<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
+    let deadline = Instant::now() + DEADLINE;
+    loop {
+        if let Some(answer) = ask() {
+            return answer;
+        }
+        assert!(Instant::now() < deadline, "never: {what}");
+    }
+}
 
 /// Path of one of our binaries.
 ///
@@ -80,7 +97,7 @@ impl From<Output> for CommandOutput {
     }
 }
 
-/// Runs `tactus` to its end, in `folder`.
+/// Runs `tactus` to its end, in `folder`. One that hangs is killed: its exit code is `None`.
 ///
 /// # Panics
 /// If it cannot be started.
@@ -88,8 +105,23 @@ pub fn tactus(folder: &Path, args: &[&str]) -> CommandOutput {
     let mut command = Command::new(binary("tactus"));
     // The lab's own effects are those of the test, not of the user.
     command.env("XDG_STATE_HOME", folder.join("state")).env_remove("STATE_DIRECTORY");
-    let output = command.args(args).current_dir(folder).stdin(Stdio::null()).output();
-    output.expect("tactus starts").into()
+    command.args(args).current_dir(folder).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let child = command.spawn().expect("tactus starts");
+    let pid = pid_of(&child);
+    let (running, ended) = mpsc::channel::<()>();
+    thread::spawn(move || {
+        if ended.recv_timeout(COMPUTATION_DEADLINE) == Err(RecvTimeoutError::Timeout) {
+            // It may end just now.
+            drop(kill_process(pid, Signal::KILL));
+        }
+    });
+    let output = child.wait_with_output();
+    drop(running);
+    output.expect("the output can be read").into()
+}
+
+fn pid_of(child: &Child) -> Pid {
+    i32::try_from(child.id()).ok().and_then(Pid::from_raw).expect("a process id")
 }
 
 /// A process that runs beside the test and is killed with it.
@@ -264,8 +296,7 @@ impl Process {
     /// # Panics
     /// If it has already ended.
     pub fn signal(&self, signal: Signal) {
-        let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw).expect("a process id");
-        kill_process(pid, signal).expect("the process is there");
+        kill_process(pid_of(&self.child), signal).expect("the process is there");
     }
 
     /// Kills it, and returns when it is gone with all that it held: a port that it listened on is free again.
@@ -287,8 +318,8 @@ impl Process {
         loop {
             match self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
                 Ok(line) => self.seen.push(line),
-                Err(mpsc::RecvTimeoutError::Disconnected) => break,
-                Err(mpsc::RecvTimeoutError::Timeout) => {
+                Err(RecvTimeoutError::Disconnected) => break,
+                Err(RecvTimeoutError::Timeout) => {
                     panic!("{} does not end; it printed:\n{}", self.name, self.seen.join("\n"))
                 }
             }
@@ -348,15 +379,9 @@ impl ServiceUnderTest {
     /// If one of them does not start.
     pub fn start_unread(change: impl Fn(String) -> String) -> Self {
         let lab = Self::start_with(change, Process::start_unread);
-        let deadline = Instant::now() + DEADLINE;
         // It cannot say that it is ready. Each attempt waits for an answer by itself.
-        loop {
-            let reset = lab.tactus(&["reset"]);
-            if reset.code == Some(0) {
-                return lab;
-            }
-            assert!(Instant::now() < deadline, "{reset:?}");
-        }
+        until("a reset", || (lab.tactus(&["reset"]).code == Some(0)).then_some(()));
+        lab
     }
 
     fn start_with(

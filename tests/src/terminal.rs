@@ -6,7 +6,7 @@ use std::num::NonZeroU16;
 use std::os::fd::OwnedFd;
 use std::path::Path;
 use std::process::{Child, Command};
-use std::sync::mpsc::{self, Receiver};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::Instant;
 
@@ -117,8 +117,17 @@ impl Terminal {
     /// Waits for the program's end and returns its exit code.
     ///
     /// # Panics
-    /// If it cannot be waited for.
+    /// If it hangs.
     pub fn wait(&mut self) -> Option<i32> {
+        let deadline = Instant::now() + DEADLINE;
+        // Its output ends with it.
+        loop {
+            match self.output.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(bytes) => self.screen.process(&bytes),
+                Err(RecvTimeoutError::Disconnected) => break,
+                Err(RecvTimeoutError::Timeout) => panic!("it does not end; its screen:\n{}", self.text()),
+            }
+        }
         self.child.wait().expect("a child can be waited for").code()
     }
 }
