@@ -4,7 +4,7 @@
 
 use std::{os::unix::fs::PermissionsExt as _, time::Duration};
 
-use crate::lab::{Service, connected, event, frame, open, raw_session, router};
+use crate::lab::{Service, connected, event, frame, open, raw_session, router, settled};
 use prost::Message as _;
 use tactus_bus::{Bus, BusConfig, BusError, Client, Endpoint, History, Hold, Request};
 use tactus_schema::{
@@ -218,9 +218,10 @@ async fn frames_of_another_publisher_are_not_the_rigs() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn behind_a_router_frames_of_another_publisher_are_dropped_and_counted() {
-    let (_router, endpoint, service) = behind_a_router().await;
+    let (_router, endpoint, mut service) = behind_a_router().await;
     let client = connected(&endpoint, "bench").await;
     let mut frames = client.subscribe::<pb::Frame>(History::None).await.unwrap();
+    settled(&client, &mut service.calls).await;
     let session = raw_session(&endpoint).await;
     let fake = pb::Frame::from(&frame(666)).encode_to_vec();
     // The rogue waits until it is heard: then the fakes go before the service's frame.

@@ -2,7 +2,7 @@
 //!
 //! Clients that subscribe to the topic's plain key crash the service in one run of six: see `topic::heard`.
 
-use crate::lab::{event, open};
+use crate::lab::{Service, event, open, refused};
 use tactus_bus::{Client, History};
 use tactus_schema::pb;
 
@@ -15,14 +15,16 @@ const EVENTS: u64 = 1_000;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn clients_that_come_and_go_do_not_harm_a_service_that_publishes() {
-    let service = open("bench", &[]).await;
+    let Service { bus, mut calls, endpoint } = open("bench", &[]).await;
+    tokio::spawn(async move { while calls.commands.recv().await.is_some() {} });
     let visit = |client: u64| {
-        let (endpoint, publisher) = (service.endpoint.clone(), service.bus.publisher());
+        let (endpoint, publisher) = (endpoint.clone(), bus.publisher());
         async move {
             for nth in 0..VISITS {
                 let first = (client * VISITS + nth) * EVENTS;
                 let client = Client::connect(&endpoint, Some("bench")).await.unwrap();
                 let mut events = client.subscribe::<pb::RunEvent>(History::None).await.unwrap();
+                refused(&client).await;
                 for seq in first..first + EVENTS {
                     publisher.publish(&event(seq));
                 }
@@ -34,5 +36,5 @@ async fn clients_that_come_and_go_do_not_harm_a_service_that_publishes() {
     for visit in visits {
         visit.await.unwrap();
     }
-    service.bus.close().await.unwrap();
+    bus.close().await.unwrap();
 }

@@ -97,9 +97,13 @@ pub(crate) async fn connected(endpoint: &Endpoint, rig: &str) -> Client {
 /// Returns once the service has processed the client's earlier declarations: declarations and commands of one session keep
 /// their order.
 pub(crate) async fn settled(client: &Client, calls: &mut Calls) {
+    tokio::join!(refused(client), async { drop(calls.commands.recv().await) });
+}
+
+/// As [`settled`], of a service whose commands somebody else drops.
+pub(crate) async fn refused(client: &Client) {
     let request = pb::CommandRequest { who: "test".to_owned(), ..Default::default() };
-    let asked = client.command(Command::Status, &request, Duration::from_hours(1));
-    let (answer, ()) = tokio::join!(asked, async { drop(calls.commands.recv().await) });
+    let answer = client.command(Command::Status, &request, Duration::from_hours(1)).await;
     assert!(matches!(answer, Err(BusError::NoAnswer { .. })), "{answer:?}");
 }
 
