@@ -112,7 +112,7 @@ pub fn tactus(folder: &Path, args: &[&str]) -> CommandOutput {
     thread::spawn(move || {
         if ended.recv_timeout(COMPUTATION_DEADLINE) == Err(RecvTimeoutError::Timeout) {
             // It may end just now.
-            drop(kill_process(pid, Signal::KILL));
+            let _ended = kill_process(pid, Signal::KILL);
         }
     });
     let output = child.wait_with_output();
