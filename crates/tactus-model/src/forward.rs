@@ -128,32 +128,58 @@ impl ForwardModel {
     /// # Panics
     /// If `indentation_mm` has not one place per element.
     pub fn indentation_of(&self, press: &Load, covering: Covering, indentation_mm: &mut [f64]) {
+        self.indentation_again(press, covering, &mut Shares::default(), indentation_mm);
+    }
+
+    /// As [`ForwardModel::indentation_of`], to the bit. `shares` are those of the last press of this model: a flat tool that only
+    /// goes deeper, or less deep, blurs as before.
+    pub(crate) fn indentation_again(
+        &self,
+        press: &Load,
+        covering: Covering,
+        shares: &mut Shares,
+        indentation_mm: &mut [f64],
+    ) {
         assert_eq!(indentation_mm.len(), self.array.elements(), "one place per element");
         indentation_mm.fill(0.0);
         let Load { contact, lean, sigma_mm, .. } = press;
         let finest_mm = sigma_mm[0].min(sigma_mm[1]);
         let blurs = sigma_mm.map(|sigma_mm| Blur { sigma_mm });
-        self.press(&contact.leaning(*lean, finest_mm), blurs, 1.0, indentation_mm);
+        self.press(&contact.leaning(*lean, finest_mm), blurs, 1.0, shares, indentation_mm);
         // The tool cannot go deeper than the covering: min(I, t) = max(0, I) - max(0, I - t).
         if contact.depth_mm > covering.thickness_mm {
             let beyond = Contact { depth_mm: contact.depth_mm - covering.thickness_mm, ..contact.clone() };
-            self.press(&beyond.leaning(*lean, finest_mm), blurs, -1.0, indentation_mm);
+            let slices = beyond.leaning(*lean, finest_mm);
+            self.press(&slices, blurs, -1.0, &mut Shares::default(), indentation_mm);
         }
     }
 
     /// Adds what slices give, spread along x and y, times `sign`.
-    fn press(&self, slices: &[Slice], [along_x, along_y]: [Blur; 2], sign: f64, indentation_mm: &mut [f64]) {
+    fn press(
+        &self,
+        slices: &[Slice],
+        blurs: [Blur; 2],
+        sign: f64,
+        shares: &mut Shares,
+        indentation_mm: &mut [f64],
+    ) {
         let [cols, rows] = self.array.sides_mm();
+        shares.keep_up(slices, blurs, [&cols, &rows]);
         let scale = sign / self.reference_mm2;
-        for of_one_x in slices.chunk_by(|one, other| one.x_mm.total_cmp(&other.x_mm).is_eq()) {
-            let Some(Slice { x_mm, .. }) = of_one_x.first() else { continue };
-            let of_cols: Vec<f64> =
-                cols.iter().map(|side_mm| scale * along_x.of_point(*x_mm, *side_mm)).collect();
-            for (row, side_mm) in indentation_mm.chunks_exact_mut(cols.len()).zip(&rows) {
-                let of_slice = |slice: &Slice| of_sloped(along_y, slice, *side_mm);
+        let lines_mm = shares.of_rows_mm.chunks_exact(rows.len());
+        let mut strips = slices.iter().zip(lines_mm);
+        let groups = slices.chunk_by(|one, other| is_same(one.x_mm, other.x_mm));
+        for (of_one_x, of_cols) in groups.zip(shares.of_cols.chunks_exact(cols.len())) {
+            let of_one_x: Vec<_> = strips.by_ref().take(of_one_x.len()).collect();
+            for ((row, side_mm), index) in
+                indentation_mm.chunks_exact_mut(cols.len()).zip(&rows).zip(0_usize..)
+            {
+                let of_slice = |(slice, lines_mm): &(&Slice, &[f64])| {
+                    of_sloped(blurs[1], slice, *side_mm, lines_mm[index])
+                };
                 let of_row: f64 = of_one_x.iter().map(of_slice).sum();
-                for (element, of_col) in row.iter_mut().zip(&of_cols) {
-                    *element += of_col * of_row;
+                for (element, of_col) in row.iter_mut().zip(of_cols) {
+                    *element += scale * of_col * of_row;
                 }
             }
         }
@@ -222,9 +248,56 @@ impl Response {
     }
 }
 
-/// What a slice whose weight may grow along y gives to a side, in mm^3 per mm of x.
-fn of_sloped(along_y: Blur, slice: &Slice, side_mm: [f64; 2]) -> f64 {
-    let line_mm = along_y.of_line(slice.y_mm, side_mm);
+/// What the sides of an array get of slices by their places alone, whatever their weights.
+#[derive(Debug, Default)]
+pub(crate) struct Shares {
+    /// Spread along x and y.
+    sigma_mm: [f64; 2],
+    /// Of each slice: position along x, least and greatest y.
+    places_mm: Vec<[f64; 3]>,
+    /// For each x among the slices: the share of each column.
+    of_cols: Vec<f64>,
+    /// For each slice: its length along each row.
+    of_rows_mm: Vec<f64>,
+}
+
+impl Shares {
+    /// Computes them, unless they are of the same places under the same spread. The array is always the same.
+    fn keep_up(&mut self, slices: &[Slice], blurs: [Blur; 2], [cols, rows]: [&[[f64; 2]]; 2]) {
+        let sigma_mm = blurs.map(|blur| blur.sigma_mm);
+        let places_mm = slices.iter().map(|Slice { x_mm, y_mm: [from, to], .. }| [*x_mm, *from, *to]);
+        let is_known = self.places_mm.len() == slices.len()
+            && self.places_mm.iter().zip(places_mm.clone()).all(|(known, place)| are_same(*known, place))
+            && are_same(self.sigma_mm, sigma_mm);
+        if is_known {
+            return;
+        }
+        let [along_x, along_y] = blurs;
+        let xs_mm =
+            slices.chunk_by(|one, other| is_same(one.x_mm, other.x_mm)).map(|of_one_x| of_one_x[0].x_mm);
+        let of_x = |x_mm: f64| cols.iter().map(move |side_mm| along_x.of_point(x_mm, *side_mm));
+        let of_y = |y_mm: [f64; 2]| rows.iter().map(move |side_mm| along_y.of_line(y_mm, *side_mm));
+        self.sigma_mm = sigma_mm;
+        self.places_mm.clear();
+        self.places_mm.extend(places_mm);
+        self.of_cols.clear();
+        self.of_cols.extend(xs_mm.flat_map(of_x));
+        self.of_rows_mm.clear();
+        self.of_rows_mm.extend(slices.iter().flat_map(|slice| of_y(slice.y_mm)));
+    }
+}
+
+fn are_same<const N: usize>(these: [f64; N], those: [f64; N]) -> bool {
+    these.into_iter().zip(those).all(|(this, that)| is_same(this, that))
+}
+
+/// To the bit.
+fn is_same(this: f64, that: f64) -> bool {
+    this.total_cmp(&that).is_eq()
+}
+
+/// What a slice whose weight may grow along y gives to a side that gets `line_mm` of it, in mm^3 per mm of x.
+fn of_sloped(along_y: Blur, slice: &Slice, side_mm: [f64; 2], line_mm: f64) -> f64 {
     let even = slice.weight_mm2 * line_mm;
     if slice.slope_mm == 0.0 {
         return even;

@@ -33,7 +33,7 @@ impl Images {
         base: BaseModel<'_>,
         press: &Load,
         image_mm: &mut [f64],
-        compute: &impl Fn(&Load, &mut [f64]),
+        compute: &mut impl FnMut(&Load, &mut [f64]),
     ) {
         let thickness_mm = base.covering.thickness_mm;
         let depth_mm = press.contact.depth_mm;
@@ -67,7 +67,7 @@ impl Images {
         base: BaseModel<'_>,
         press: &Load,
         image_mm: &mut [f64],
-        compute: &impl Fn(&Load, &mut [f64]),
+        compute: &mut impl FnMut(&Load, &mut [f64]),
     ) {
         let Some(key) = key(base, press) else { return compute(press, image_mm) };
         let known = self.held.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();

@@ -6,6 +6,7 @@ use crate::effect::{
     BaseModel, Drafted, Effect, EffectError, Load, Make, Now, OnContact, OnCovering, OnElement, OnMotion,
     OnReadout, PipelineStage, Tabled, TipState,
 };
+use crate::forward::Shares;
 use crate::{
     Contact, Covering, ForwardModel, Images, Indenter, Path, PressTable, PressTableError, Readout,
     Registration, Simulator,
@@ -72,6 +73,8 @@ struct Pressed {
     at: Option<([f64; 2], f64, f64)>,
     contact: Contact,
     loads: Vec<Load>,
+    /// What the last press of each load leaves for the next.
+    shares: Vec<Shares>,
     reached_mm: Vec<f64>,
     of_one_mm: Vec<f64>,
 }
@@ -132,6 +135,7 @@ impl Pipeline {
                     depth_mm: 0.0,
                 },
                 loads: Vec::new(),
+                shares: Vec::new(),
                 reached_mm: vec![0.0; elements],
                 of_one_mm: vec![0.0; elements],
             },
@@ -414,12 +418,15 @@ impl Pressed {
         self.reached_mm.fill(0.0);
         // A press table holds for the tool and the spread as declared.
         let table = table.filter(|_| stages.contact.is_empty());
-        for load in self.loads.iter().filter(|load| load.contact.depth_mm > 0.0) {
+        self.shares.resize_with(self.loads.len().max(self.shares.len()), Shares::default);
+        let loads = self.loads.iter().zip(&mut self.shares);
+        for (load, shares) in loads.filter(|(load, _)| load.contact.depth_mm > 0.0) {
             let tabulated = table.is_some_and(|table| load.tabulated(table, base, &mut self.of_one_mm));
             if !tabulated {
-                let compute = |load: &Load, image_mm: &mut [f64]| load.indentation(base, image_mm);
+                let mut compute =
+                    |load: &Load, image_mm: &mut [f64]| load.indentation(base, shares, image_mm);
                 match images {
-                    Some(images) => images.recall(base, load, &mut self.of_one_mm, &compute),
+                    Some(images) => images.recall(base, load, &mut self.of_one_mm, &mut compute),
                     None => compute(load, &mut self.of_one_mm),
                 }
             }
@@ -446,9 +453,9 @@ impl Load {
     }
 
     /// The signal of every element, in units of the base model's reference press; 0 for an impossible spread.
-    fn indentation(&self, base: BaseModel<'_>, indentation_mm: &mut [f64]) {
+    fn indentation(&self, base: BaseModel<'_>, shares: &mut Shares, indentation_mm: &mut [f64]) {
         if self.sigma_mm.iter().all(|sigma_mm| *sigma_mm > 0.0) {
-            base.model.indentation_of(self, base.covering, indentation_mm);
+            base.model.indentation_again(self, base.covering, shares, indentation_mm);
         } else {
             indentation_mm.fill(0.0);
         }

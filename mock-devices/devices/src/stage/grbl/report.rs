@@ -1,5 +1,7 @@
 //! Texts that the controller sends.
 
+use std::fmt;
+
 use super::gcode::GrblError;
 use super::input::BUFFER_BYTES;
 
@@ -52,25 +54,38 @@ impl Status {
         } else {
             ("WPos", std::array::from_fn(|axis| self.machine_mm[axis] - self.work_offset_mm[axis]))
         };
-        let position = triple(position_mm);
-        let buffers = self.buffers.map_or(String::new(), |(moves, free_bytes)| {
-            format!("|Bf:{},{}", PLANNER_BLOCKS.saturating_sub(moves), free_bytes.min(BUFFER_BYTES))
+        let buffers = fmt::from_fn(|f| {
+            self.buffers.map_or(Ok(()), |(moves, free_bytes)| {
+                write!(f, "|Bf:{},{}", PLANNER_BLOCKS.saturating_sub(moves), free_bytes.min(BUFFER_BYTES))
+            })
         });
-        let feed_mm_per_min = self.speed_mm_per_s * 60.0;
-        let now_and_then = match self.number % 10 {
-            0 => format!("|WCO:{}", triple(self.work_offset_mm)),
-            1 => "|Ov:100,100,100".to_owned(),
-            _ => String::new(),
-        };
-        format!("<{}|{frame}:{position}{buffers}|FS:{feed_mm_per_min:.0},0{now_and_then}>\r\n", self.state)
+        let now_and_then = fmt::from_fn(|f| match self.number % 10 {
+            0 => write!(f, "|WCO:{}", triple(self.work_offset_mm)),
+            1 => f.write_str("|Ov:100,100,100"),
+            _ => Ok(()),
+        });
+        let (state, position) = (self.state, triple(position_mm));
+        let feed_mm_per_min = whole((self.speed_mm_per_s * 60.0).round_ties_even());
+        format!("<{state}|{frame}:{position}{buffers}|FS:{feed_mm_per_min},0{now_and_then}>\r\n")
     }
 }
 
 /// Three coordinates with three decimals.
-fn triple(mm: [f64; 3]) -> String {
-    // Negative zero would print a sign.
-    let [x, y, z] = mm.map(|mm| (mm * 1000.0).round() / 1000.0 + 0.0);
-    format!("{x:.3},{y:.3},{z:.3}")
+fn triple(mm: [f64; 3]) -> impl fmt::Display {
+    // Whole microns: exact decimals of binary fractions would take ten times as long, in every report.
+    let mm = mm.map(|mm| {
+        let um = whole((mm * 1000.0).round());
+        fmt::from_fn(move |f| {
+            let sign = if um < 0 { "-" } else { "" };
+            write!(f, "{sign}{}.{:03}", um.unsigned_abs() / 1000, um.unsigned_abs() % 1000)
+        })
+    });
+    fmt::from_fn(move |f| write!(f, "{},{},{}", mm[0], mm[1], mm[2]))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "no stage is a light year long")]
+fn whole(rounded: f64) -> i64 {
+    rounded as i64
 }
 
 #[cfg(test)]
