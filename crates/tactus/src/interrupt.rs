@@ -1,6 +1,7 @@
-//! Signals that would end the program: they stop the run in progress. Without a run they remove what is unfinished and end the
+//! Signals that would end the program: they stop the runs in progress. Without a run they remove what is unfinished and end the
 //! program.
 
+use std::collections::BTreeMap;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
@@ -12,34 +13,40 @@ use tactus_runner::signals::{Ending, EndingSignals};
 
 use crate::progress::RunProgress;
 
-/// The run that this process prepares or makes now. Signals belong to the process, and so does this.
-static RUN: Mutex<Option<Run>> = Mutex::new(None);
+/// The runs that this process prepares or makes now. Signals belong to the process, and so does this.
+static RUNS: Mutex<Runs> = Mutex::new(Runs { latest: 0, each: BTreeMap::new(), came: None });
+
+struct Runs {
+    /// Number of the run that was prepared last.
+    latest: u64,
+    each: BTreeMap<u64, Run>,
+    /// The signal that came since there are any.
+    came: Option<Ending>,
+}
 
 struct Run {
     progress: Arc<RunProgress>,
-    /// The signal that came during the preparation.
-    came: Option<Ending>,
     /// Its engine, once it has begun.
     engine: Option<Engine>,
 }
 
 impl Run {
-    fn stop(&self) {
-        if let (Some(engine), Some(ending)) = (&self.engine, self.came) {
+    fn stop(&self, ending: Ending) {
+        if let Some(engine) = &self.engine {
             engine.stop(StopOrder { by: "signal".into(), reason: ending.name.into(), abort: false });
             self.progress.say(&format!("{}: stopping and retracting", ending.name));
         }
     }
 }
 
-fn run() -> MutexGuard<'static, Option<Run>> {
-    RUN.lock().unwrap_or_else(PoisonError::into_inner)
+fn runs() -> MutexGuard<'static, Runs> {
+    RUNS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// While it lives, signals stop a run instead of ending the program.
 #[must_use = "signals end the program once this is dropped"]
 #[derive(Debug)]
-pub(crate) struct StopsRun(());
+pub(crate) struct StopsRun(u64);
 
 impl StopsRun {
     /// Listens from here on.
@@ -47,29 +54,42 @@ impl StopsRun {
     /// # Errors
     /// If the system gives no runtime, handler or thread.
     pub(crate) fn prepare(progress: Arc<RunProgress>) -> anyhow::Result<Self> {
-        *run() = Some(Run { progress, came: None, engine: None });
-        let stops = Self(());
+        let stops = {
+            let mut runs = runs();
+            runs.latest += 1;
+            let number = runs.latest;
+            runs.each.insert(number, Run { progress, engine: None });
+            Self(number)
+        };
         listen()?;
         Ok(stops)
     }
 
-    /// True once a signal came.
+    /// True once a signal came, which is for all runs of this process.
     pub(crate) fn is_asked() -> bool {
-        run().as_ref().is_some_and(|run| run.came.is_some())
+        runs().came.is_some()
     }
 
     /// The run begins: from here on a signal stops its engine, also one that came before.
-    pub(crate) fn begin(engine: Engine) {
-        if let Some(run) = &mut *run() {
+    pub(crate) fn begin(&self, engine: Engine) {
+        let mut runs = runs();
+        let came = runs.came;
+        if let Some(run) = runs.each.get_mut(&self.0) {
             run.engine = Some(engine);
-            run.stop();
+            if let Some(ending) = came {
+                run.stop(ending);
+            }
         }
     }
 }
 
 impl Drop for StopsRun {
     fn drop(&mut self) {
-        *run() = None;
+        let mut runs = runs();
+        runs.each.remove(&self.0);
+        if runs.each.is_empty() {
+            runs.came = None;
+        }
     }
 }
 
@@ -150,16 +170,15 @@ fn listen() -> anyhow::Result<()> {
         runtime.block_on(async {
             loop {
                 let ending = signals.next().await;
-                let mut run = run();
-                if let Some(run) = &mut *run {
-                    run.came = Some(ending);
-                    run.stop();
-                } else {
+                let mut runs = runs();
+                if runs.each.is_empty() {
                     // Held to the end, so that nobody makes or finishes anything meanwhile.
                     let unfinished = unfinished();
                     unfinished.iter().for_each(|folder| remove(folder));
                     process::exit(ending.exit_code())
                 }
+                runs.came = Some(ending);
+                runs.each.values().for_each(|run| run.stop(ending));
             }
         })
     };

@@ -6,17 +6,27 @@ use std::fmt;
 use std::io::{self, Write as _};
 use std::mem;
 use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, LazyLock, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressState, ProgressStyle};
+use indicatif::{
+    MultiProgress, ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressState, ProgressStyle,
+};
 use tactus_record::meter;
 use tactus_runner::twin::{Attend, SoFar};
 use tactus_schema::pb::{RunPhase, RunState};
 
 use crate::output::duration;
 pub(crate) use discovery::DiscoveryProgress;
+
+/// The bars of all runs that this process makes now, one below the other.
+static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
+
+/// Has something printed while runs may be in progress.
+pub(crate) fn beside_runs(print: impl FnOnce()) {
+    BARS.suspend(print);
+}
 
 /// Progress bar of a run on standard error, after that of its dry run: presses, frames, losses, time left. Hidden with `--json` and without a
 /// terminal.
@@ -156,7 +166,8 @@ fn set_share(bar: &ProgressBar, share: f64) {
 
 /// Draws until the run is over.
 fn draw(next: &Next, silent: bool, title: String) {
-    let bar = ProgressBar::with_draw_target(None, target(silent)).with_prefix(title);
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()).with_prefix(title);
+    let bar = if silent { bar } else { BARS.add(bar) };
     styled(&bar, "{prefix}dry run  {elapsed:>4}  {msg}");
     let mut is_rehearsing = true;
     loop {

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -16,9 +17,8 @@ use tactus_runner::order::RunRequest;
 use tactus_runner::script_process::ScriptProcesses;
 use tactus_runner::twin::{Attend, SoFar};
 use tactus_schema::Rig;
-use tactus_schema::pb::{self, RunPhase, RunState};
+use tactus_schema::pb::{self, RunState};
 use tokio::sync::watch;
-use tokio::time::{MissedTickBehavior, interval};
 
 use super::{RunSummary, Subject, Told, taken_over_in_words};
 use crate::cli::RunArgs;
@@ -56,15 +56,16 @@ pub(super) fn run(args: &RunArgs, subject: Subject, why: &str, told: Told<'_>) -
     let taken_over = request.earlier.as_ref().map(|earlier| earlier.taken_over());
     let waiting = Waiting(&progress);
     let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, &waiting, |engine, order| {
-        StopsRun::begin(engine.clone());
+        stops_run.begin(engine.clone());
         if let Some(taken) = taken_over.as_ref().filter(|_| told.has_words()) {
             progress.say(&taken_over_in_words(taken, order.planned.map_or(0, |planned| planned.presses)));
         }
         attending = attend(engine, &progress, pace);
     });
     drop(stops_run);
-    if let Some(attending) = attending {
-        // The thread ends with the run. A panic in it has printed its own message.
+    if let Some((over, attending)) = attending {
+        drop(over);
+        // A panic in the thread has printed its own message.
         drop(attending.join());
     }
     progress.clear();
@@ -174,36 +175,30 @@ fn wrong_truth(path: &Path, error: &TruthError) -> anyhow::Error {
     Failure::new(Exit::Usage, format!("{}: {error}", path.display())).into()
 }
 
-/// Shows the progress of a run on a thread of its own until it is finished. The run may occupy the calling thread.
-fn attend(engine: &Engine, progress: &Arc<RunProgress>, pace: Pace) -> Option<JoinHandle<()>> {
+/// Shows the progress of a run on a thread of its own until the sender is dropped. The run may occupy the calling thread.
+fn attend(
+    engine: &Engine,
+    progress: &Arc<RunProgress>,
+    pace: Pace,
+) -> Option<(SyncSender<()>, JoinHandle<()>)> {
     let (state, progress) = (engine.state(), Arc::clone(progress));
+    // Without a message: it only ends.
+    let (over, is_over) = sync_channel(0);
+    let follow = move || follow(&state, &is_over, &progress, pace);
     // Without a thread there is no progress, but the run goes on.
-    let spawned = thread::Builder::new().name("attend".into()).spawn(move || {
-        if let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() {
-            runtime.block_on(follow(state, &progress, pace));
-        }
-    });
-    spawned.ok()
+    let spawned = thread::Builder::new().name("attend".into()).spawn(follow);
+    spawned.ok().map(|attending| (over, attending))
 }
 
-async fn follow(state: watch::Receiver<RunState>, progress: &RunProgress, pace: Pace) {
+/// Looks now and then: news of a run in virtual time come by the ten thousands.
+fn follow(state: &watch::Receiver<RunState>, is_over: &Receiver<()>, progress: &RunProgress, pace: Pace) {
     let mut pacing = Pacing::default();
-    let mut redraw = interval(REDRAW);
-    redraw.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let mut ended = state.clone();
-    loop {
-        tokio::select! {
-            biased;
-            // The engine's end ends it, too.
-            _ = ended.wait_for(|state| state.phase() == RunPhase::Finished) => return,
-            _ = redraw.tick() => {
-                let mut now = state.borrow().clone();
-                if pace == Pace::Virtual {
-                    now.remaining_s = pacing.left_s(now.remaining_s, Instant::now());
-                }
-                progress.show(&now);
-            }
+    while is_over.recv_timeout(REDRAW) == Err(RecvTimeoutError::Timeout) {
+        let mut now = state.borrow().clone();
+        if pace == Pace::Virtual {
+            now.remaining_s = pacing.left_s(now.remaining_s, Instant::now());
         }
+        progress.show(&now);
     }
 }
 

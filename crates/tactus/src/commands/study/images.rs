@@ -17,7 +17,7 @@ use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_scene::shapes::Scene;
 use toml::{Table, Value};
 
-use super::steps::{StudyStep, StudySteps};
+use super::steps::{CompletedStep, StudyStep, StudySteps};
 use crate::cli::{Common, StudyArgs};
 use crate::commands::calibrate::Calibrated;
 
@@ -43,15 +43,13 @@ pub(super) fn take(
     if calibrated.model().is_none() {
         return Ok(None);
     }
-    steps.begin_part(ANGLES_DEG.len() + 1);
-    let mut angles = Vec::new();
-    for angle_deg in ANGLES_DEG {
-        let heading = format!("{angle_deg}\u{b0}");
-        angles.extend(pressed(common, args, steps, calibrated, angle_deg, &COVERINGS[..1], |_| {
-            heading.clone()
-        })?);
-    }
-    let coverings = pressed(common, args, steps, calibrated, 0.0, &COVERINGS, inches)?;
+    let images: Vec<HImage> =
+        ANGLES_DEG.map(HImage::under_the_thinnest).into_iter().chain([HImage::UPRIGHT]).collect();
+    let wanted: Vec<_> = images.iter().map(|image| image.step(args)).collect::<Result<_, _>>()?;
+    let taken = steps.take(common, args, &wanted)?;
+    let mut compared = images.iter().zip(&taken).map(|(image, taken)| image.compare(calibrated, taken));
+    let angles = compared.by_ref().take(ANGLES_DEG.len()).collect::<Result<Vec<_>, _>>()?.concat();
+    let coverings = compared.collect::<Result<Vec<_>, _>>()?.concat();
     let all = angles.iter().chain(&coverings);
     let worst_percent = all.map(SideBySide::difference_percent).fold(0.0, f64::max);
     let figure = |number: &str, title: &str, contacts: &[SideBySide], caption: &str| StudyFigure {
@@ -83,28 +81,49 @@ pub(super) fn take(
     }))
 }
 
-/// Images of the H at one angle under each covering, from the rig and from the model.
-fn pressed(
-    common: &Common,
-    args: &StudyArgs,
-    steps: &mut StudySteps,
-    calibrated: &Calibrated,
+/// The H at one angle, pressed under some coverings.
+struct HImage {
     angle_deg: f64,
-    coverings: &[Covering],
-    heading: impl Fn(Covering) -> String,
-) -> anyhow::Result<Vec<SideBySide>> {
-    let mesh = turned(&Scene::H.mesh(), angle_deg)?;
-    let of = if let [_] = coverings { format!("{angle_deg} degrees") } else { "each covering".into() };
-    let thicknesses_mm: Vec<f64> = coverings.iter().map(|covering| covering.thickness_mm).collect();
-    let step = StudyStep {
-        name: format!("image of the H, {of}"),
-        experiment: "image",
-        parameters: vec![format!("depth_mm={DEPTH_MM}"), format!("coverings_mm={thicknesses_mm:?}")],
-        rig_file: Some(rig_with(args, &mesh, angle_deg)?),
-    };
-    let taken = steps.take(common, args, &step)?;
-    let (_, readings) = rows::readings(&[&taken.recording])?;
-    compare(calibrated, &readings, mesh, heading)
+    coverings: &'static [Covering],
+}
+
+impl HImage {
+    const UPRIGHT: Self = Self { angle_deg: 0.0, coverings: &COVERINGS };
+
+    fn under_the_thinnest(angle_deg: f64) -> Self {
+        Self { angle_deg, coverings: &COVERINGS[..1] }
+    }
+
+    fn is_of_each_covering(&self) -> bool {
+        self.coverings.len() > 1
+    }
+
+    /// The run that takes the images.
+    fn step(&self, args: &StudyArgs) -> anyhow::Result<StudyStep> {
+        let Self { angle_deg, coverings } = self;
+        let of =
+            if self.is_of_each_covering() { "each covering".into() } else { format!("{angle_deg} degrees") };
+        let thicknesses_mm: Vec<f64> = coverings.iter().map(|covering| covering.thickness_mm).collect();
+        Ok(StudyStep {
+            name: format!("image of the H, {of}"),
+            experiment: "image",
+            parameters: vec![format!("depth_mm={DEPTH_MM}"), format!("coverings_mm={thicknesses_mm:?}")],
+            rig_file: Some(rig_with(args, &self.mesh()?, *angle_deg)?),
+        })
+    }
+
+    /// What the rig has read beside what the model says.
+    fn compare(&self, calibrated: &Calibrated, taken: &CompletedStep) -> anyhow::Result<Vec<SideBySide>> {
+        let heading = |covering| {
+            if self.is_of_each_covering() { inches(covering) } else { format!("{}\u{b0}", self.angle_deg) }
+        };
+        let (_, readings) = rows::readings(&[&taken.recording])?;
+        compare(calibrated, &readings, self.mesh()?, heading)
+    }
+
+    fn mesh(&self) -> anyhow::Result<Mesh> {
+        turned(&Scene::H.mesh(), self.angle_deg)
+    }
 }
 
 fn compare(

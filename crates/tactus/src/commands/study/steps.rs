@@ -2,8 +2,10 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::Context;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use tactus_model::Covering;
 use tactus_report::figures::COVERINGS;
@@ -14,6 +16,7 @@ use crate::cli::{Common, ExperimentArgs, LeaseArgs, RunArgs, RunSubject, StudyAr
 use crate::commands::run::execute_part;
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, say};
+use crate::progress::beside_runs;
 use crate::sha256;
 
 /// Name of the format of `study.json`.
@@ -35,9 +38,6 @@ pub(super) struct StudySteps {
     taken: Vec<CompletedStep>,
     #[serde(skip)]
     path: PathBuf,
-    /// Steps of the present part of the study that are done, and all of them.
-    #[serde(skip)]
-    part: [usize; 2],
 }
 
 /// A completed run.
@@ -91,7 +91,6 @@ impl StudySteps {
             truth: args.truth.as_deref().map(sha256::of_file).transpose()?,
             taken: Vec::new(),
             path: path.clone(),
-            part: [0, 0],
         };
         if !path.exists() {
             return Ok(new);
@@ -136,90 +135,108 @@ impl StudySteps {
             ],
             ..plain(&format!("sweep, {thickness_mm} mm"), "grid-sweep")
         }));
-        self.begin_part(steps.len());
-        steps.iter().map(|step| self.take(common, args, step)).collect()
+        self.take(common, args, &steps)
     }
 
-    /// So many steps are to be taken now; their progress is told as a part of these.
-    pub(super) fn begin_part(&mut self, steps: usize) {
-        self.part = [0, steps];
-    }
-
-    /// Runs a step, unless it is completed.
+    /// Runs the steps of a part of the study: on embedded rigs several at a time, on a service's rig one after the other.
     pub(super) fn take(
         &mut self,
         common: &Common,
         args: &StudyArgs,
-        step: &StudyStep,
-    ) -> anyhow::Result<CompletedStep> {
-        self.part[0] += 1;
-        let known = self.taken.iter().find(|taken| taken.step == step.name && taken.recording.is_file());
-        if let Some(known) = known {
-            if !common.json {
-                say(&format!("{}: already done, run {}", step.name, known.run_id));
-            }
-            return Ok(known.clone());
-        }
-        let rig_file = step.rig_file.as_ref().or(args.rig_file.as_ref());
-        let summary = execute_part(
-            common,
-            &RunArgs {
-                subject: RunSubject::from(ExperimentArgs {
-                    experiment: step.experiment.into(),
-                    parameters: step.parameters.clone(),
-                    seed: Some(args.seed),
-                }),
-                embedded: args.embedded,
-                rig_file: rig_file.cloned(),
-                truth: args.truth.clone(),
-                real_time: false,
-                out: args.out.join("runs"),
-                who: args.who.clone(),
-                no_report: true,
-                lease: LeaseArgs::default(),
-            },
-            &format!("{} of {}, {}", self.part[0], self.part[1], step.name),
-        )
-        .with_context(|| format!("step {:?}", step.name))?;
-        if !matches!(summary.exit_status, ExitStatus::Done | ExitStatus::Degraded) {
-            let error = format!(
-                "step {:?} ended as {}: {}; the same command continues from there",
-                step.name,
-                summary.exit_status.word(),
-                summary.message
-            );
-            return Err(Failure::new(Exit::of_run(summary.exit_status), error).into());
-        }
-        let taken = CompletedStep {
-            step: step.name.clone(),
-            run_id: summary.run_id,
-            presses: summary.presses,
-            duration_s: summary.duration_s,
-            embedded: summary.embedded,
-            degraded: (summary.exit_status == ExitStatus::Degraded)
-                .then(|| format!("StudyStep {:?} is degraded: {}.", step.name, summary.message)),
-            recording: std::path::absolute(&summary.recording)?,
+        steps: &[StudyStep],
+    ) -> anyhow::Result<Vec<CompletedStep>> {
+        let are_embedded =
+            args.embedded || args.rig_file.is_some() || steps.iter().all(|step| step.rig_file.is_some());
+        let kept = Mutex::new(self);
+        let take = |(index, step): (usize, &StudyStep)| {
+            let part = format!("{} of {}, {}", index + 1, steps.len(), step.name);
+            take_step(&kept, common, args, step, &part)
         };
-        if !common.json {
-            let simulated = if summary.simulated { "SIMULATED, " } else { "" };
-            say(&format!(
-                "{}: {simulated}{} presses, {} of the rig's time",
-                step.name,
-                taken.presses,
-                duration(taken.duration_s)
-            ));
+        if are_embedded {
+            steps.par_iter().enumerate().map(take).collect()
+        } else {
+            steps.iter().enumerate().map(take).collect()
         }
-        self.taken.retain(|known| known.step != step.name);
-        self.taken.push(taken.clone());
-        self.keep()?;
-        Ok(taken)
     }
 
-    /// Writes the completed steps. A study that is killed meanwhile leaves the former list or this one.
-    fn keep(&self) -> anyhow::Result<()> {
+    /// A completed step whose recording is still there.
+    fn known(&self, name: &str) -> Option<CompletedStep> {
+        self.taken.iter().find(|taken| taken.step == name && taken.recording.is_file()).cloned()
+    }
+
+    /// Adds a completed step and writes the list. A study that is killed meanwhile leaves the former list or this one.
+    fn keep(&mut self, taken: &CompletedStep) -> anyhow::Result<()> {
+        self.taken.retain(|known| known.step != taken.step);
+        self.taken.push(taken.clone());
         let beside: &Path = &self.path.with_extension("json.new");
         fs::write(beside, serde_json::to_string_pretty(self)?)
             .with_context(|| beside.display().to_string())?;
         fs::rename(beside, &self.path).with_context(|| self.path.display().to_string())
     }
+}
+
+/// Runs a step, unless it is completed; `part` is the title of its progress.
+fn take_step(
+    kept: &Mutex<&mut StudySteps>,
+    common: &Common,
+    args: &StudyArgs,
+    step: &StudyStep,
+    part: &str,
+) -> anyhow::Result<CompletedStep> {
+    let known = kept.lock().unwrap_or_else(PoisonError::into_inner).known(&step.name);
+    if let Some(known) = known {
+        if !common.json {
+            beside_runs(|| say(&format!("{}: already done, run {}", step.name, known.run_id)));
+        }
+        return Ok(known);
+    }
+    let rig_file = step.rig_file.as_ref().or(args.rig_file.as_ref());
+    let summary = execute_part(
+        common,
+        &RunArgs {
+            subject: RunSubject::from(ExperimentArgs {
+                experiment: step.experiment.into(),
+                parameters: step.parameters.clone(),
+                seed: Some(args.seed),
+            }),
+            embedded: args.embedded,
+            rig_file: rig_file.cloned(),
+            truth: args.truth.clone(),
+            real_time: false,
+            out: args.out.join("runs"),
+            who: args.who.clone(),
+            no_report: true,
+            lease: LeaseArgs::default(),
+        },
+        part,
+    )
+    .with_context(|| format!("step {:?}", step.name))?;
+    if !matches!(summary.exit_status, ExitStatus::Done | ExitStatus::Degraded) {
+        let error = format!(
+            "step {:?} ended as {}: {}; the same command continues from there",
+            step.name,
+            summary.exit_status.word(),
+            summary.message
+        );
+        return Err(Failure::new(Exit::of_run(summary.exit_status), error).into());
+    }
+    let taken = CompletedStep {
+        step: step.name.clone(),
+        run_id: summary.run_id,
+        presses: summary.presses,
+        duration_s: summary.duration_s,
+        embedded: summary.embedded,
+        degraded: (summary.exit_status == ExitStatus::Degraded)
+            .then(|| format!("StudyStep {:?} is degraded: {}.", step.name, summary.message)),
+        recording: std::path::absolute(&summary.recording)?,
+    };
+    if !common.json {
+        let simulated = if summary.simulated { "SIMULATED, " } else { "" };
+        let done = duration(taken.duration_s);
+        beside_runs(|| {
+            say(&format!("{}: {simulated}{} presses, {done} of the rig's time", step.name, taken.presses));
+        });
+    }
+    kept.lock().unwrap_or_else(PoisonError::into_inner).keep(&taken)?;
+    Ok(taken)
 }
