@@ -5,7 +5,6 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 use tactus_schema::{
     Frame,
     key::{Keys, Topic},
-    pb,
 };
 use zenoh::{
     Session, Wait,
@@ -25,6 +24,9 @@ use crate::{
 /// Period at which each topic's last sequence number is sent, so that a client notices that it missed the last message of
 /// a burst.
 const HEARTBEAT: Duration = Duration::from_millis(500);
+
+/// Room for what a frame has beside its counts; where elements are bad, it may take more.
+const FRAME_BYTES: usize = 64;
 
 /// Publishes for the service. Cheap to clone; no call ever waits.
 #[derive(Debug, Clone)]
@@ -46,15 +48,21 @@ impl Publisher {
 
     /// Publishes a frame on `sensor/frame`.
     pub fn publish_frame(&self, frame: &Frame) {
-        self.publish(&pb::Frame::from(frame));
+        let mut payload = Vec::with_capacity(FRAME_BYTES + size_of::<f32>() * frame.counts.len());
+        frame.encode(&mut payload);
+        self.push(Topic::SensorFrame, payload);
     }
 
     /// Publishes a message on its topic. When its queue is full the oldest message in it is dropped,
     /// counted and logged; after [`crate::Bus::close`] nothing is published any more.
     pub fn publish<M: Published>(&self, message: &M) {
-        let lane = Policy::of(M::TOPIC).lane;
+        self.push(M::TOPIC, message.encode_to_vec());
+    }
+
+    fn push(&self, topic: Topic, payload: Vec<u8>) {
+        let lane = Policy::of(topic).lane;
         let outlet = self.outlets.of(lane);
-        if outlet.push(Outgoing { topic: M::TOPIC, payload: message.encode_to_vec() }).is_some() {
+        if outlet.push(Outgoing { topic, payload }).is_some() {
             let dropped = outlet.dropped();
             // One line each time the count doubles, to limit the log.
             if dropped.is_power_of_two() {

@@ -8,7 +8,8 @@ mod driver;
 mod link_file;
 mod sequence;
 
-use futures_util::future::BoxFuture;
+use std::task::{Context, Poll};
+
 use tactus_schema::{Frame, pb};
 
 use crate::DeviceError;
@@ -19,10 +20,9 @@ pub use link_file::{LinkFile, LinkFileError};
 
 /// A tactile array that is being read. One task owns it.
 pub trait Sensor: Send {
-    /// Waits for the next event. There is no last one: a lost device is searched for with growing pauses.
-    ///
-    /// Cancel-safe: an event that is not returned is not lost.
-    fn next(&mut self) -> BoxFuture<'_, SensorEvent>;
+    /// The next event, once there is one; until then the task is woken as by a future. There is no last one: a lost device is
+    /// searched for with growing pauses.
+    fn poll_next(&mut self, context: &mut Context<'_>) -> Poll<SensorEvent>;
 }
 
 /// An event of a sensor.

@@ -1,6 +1,7 @@
 //! The acquisition task. It alone owns the supervisor and the recording; others ask it through a mailbox. Each frame goes to
 //! the safety supervisor, then to the recording, the run and the viewers.
 
+use std::future::poll_fn;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
@@ -131,7 +132,7 @@ pub(crate) async fn acquire(
     let mut has_sensor = true;
     loop {
         // A panic of the driver's, or of what handles its frames, must neither end the supervision nor go unnoticed.
-        let next = AssertUnwindSafe(sensor.next()).catch_unwind();
+        let next = AssertUnwindSafe(poll_fn(|context| sensor.poll_next(context))).catch_unwind();
         let handled = tokio::select! {
             biased;
             event = next, if has_sensor => {

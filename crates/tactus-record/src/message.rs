@@ -1,7 +1,5 @@
 //! The kinds of messages in a recording, listed once. Channels, encoding, decoding and counting follow from the list.
 
-use std::borrow::Cow;
-
 use prost::Message as _;
 use tactus_schema::{Frame, Message as Schema, MonoTime, TimeStamp, WallTime, key::Topic, pb};
 
@@ -127,7 +125,7 @@ macro_rules! kinds {
                 const KIND: MessageKind = MessageKind::$kind;
 
                 fn encode(&self, bytes: &mut Vec<u8>) {
-                    OnWire::<$wire>::on_wire(self).encode_raw(bytes);
+                    OnWire::<$wire>::append(self, bytes);
                 }
 
                 #[allow(unused_variables, reason = "a message without a time that is not counted")]
@@ -202,20 +200,20 @@ fn stamp(mono_ns: i64, wall_ns: i64) -> TimeStamp {
     TimeStamp { mono: MonoTime::from_ns(mono_ns), wall: WallTime::from_ns(wall_ns) }
 }
 
-/// What is sent for a message: itself, or its protobuf form.
-trait OnWire<W: Clone> {
-    fn on_wire(&self) -> Cow<'_, W>;
+/// A message that is written as the protobuf message `W`.
+trait OnWire<W> {
+    fn append(&self, bytes: &mut Vec<u8>);
 }
 
-impl<W: Schema + Clone> OnWire<W> for W {
-    fn on_wire(&self) -> Cow<'_, W> {
-        Cow::Borrowed(self)
+impl<W: Schema> OnWire<W> for W {
+    fn append(&self, bytes: &mut Vec<u8>) {
+        self.encode_raw(bytes);
     }
 }
 
 impl OnWire<pb::Frame> for Frame {
-    fn on_wire(&self) -> Cow<'_, pb::Frame> {
-        Cow::Owned(self.into())
+    fn append(&self, bytes: &mut Vec<u8>) {
+        self.encode(bytes);
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use prost::encoding::{bool, float, int64, uint32, uint64};
+
 use crate::{DeviceTick, MonoTime, TimeStamp, WallTime, pb};
 
 /// One reading of all elements; cheap to clone.
@@ -56,6 +58,42 @@ impl FrameFlags {
     }
 }
 
+impl Frame {
+    /// Appends the frame as [`pb::Frame`] is encoded, without making one.
+    pub fn encode(&self, bytes: &mut Vec<u8>) {
+        let Self { seq, epoch, device_tick, received, counts, flags, lost_before, .. } = self;
+        let Self { simulated, bad_elements, temperature_c, .. } = self;
+        // In proto3 a field that is zero is left out, unless it is optional.
+        if *seq != 0 {
+            uint64::encode(1, seq, bytes);
+        }
+        if *epoch != 0 {
+            uint32::encode(2, epoch, bytes);
+        }
+        if let Some(tick) = device_tick {
+            uint64::encode(3, &tick.0, bytes);
+        }
+        for (tag, ns) in [(4, received.mono.ns()), (5, received.wall.ns())] {
+            if ns != 0 {
+                int64::encode(tag, &ns, bytes);
+            }
+        }
+        float::encode_packed(6, counts, bytes);
+        for (tag, number) in [(7, flags.0), (8, *lost_before)] {
+            if number != 0 {
+                uint32::encode(tag, &number, bytes);
+            }
+        }
+        if *simulated {
+            bool::encode(9, simulated, bytes);
+        }
+        uint32::encode_packed(10, bad_elements, bytes);
+        if let Some(temperature_c) = temperature_c {
+            float::encode(11, temperature_c, bytes);
+        }
+    }
+}
+
 impl From<&Frame> for pb::Frame {
     fn from(frame: &Frame) -> Self {
         Self {
@@ -93,3 +131,7 @@ impl From<pb::Frame> for Frame {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "frame_tests.rs"]
+mod tests;

@@ -13,6 +13,7 @@
 //! a file.
 
 mod action;
+mod memory;
 mod reading;
 mod session;
 mod watchdog;
@@ -21,6 +22,7 @@ pub use action::{Action, Cause, Loss};
 pub use reading::{LossEvidence, Reading};
 pub use session::Session;
 
+pub(crate) use memory::Memory;
 pub(crate) use watchdog::{NO_FRAME_AFTER, SILENT_AFTER, StreamFault, Watchdog};
 
 /// A tick's length for [`Session::tick_ns`].

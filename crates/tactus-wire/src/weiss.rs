@@ -31,6 +31,7 @@ pub use command::{
 };
 pub use crc::crc;
 pub use decoder::{ChecksumError, Decoder, DecoderStats};
+pub(crate) use frame::PackedFrame;
 pub use frame::{DecodedFrame, FrameError, encode_frame};
 pub use info::{ControllerInfo, ErrorCode, InfoError, MatrixInfo, SensorInfo};
 pub use packet::{MAX_PAYLOAD_BYTES, Packet, encode_packet, id};

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::{fs, process, thread};
 
 use anyhow::Context;
@@ -157,8 +157,9 @@ fn remove(folder: &Path) {
 
 /// Starts the thread that listens, once for all runs: a run in virtual time occupies the thread that makes it.
 fn listen() -> anyhow::Result<()> {
-    static LISTENING: Once = Once::new();
-    if LISTENING.is_completed() {
+    static IS_LISTENING: Mutex<bool> = Mutex::new(false);
+    let mut is_listening = IS_LISTENING.lock().unwrap_or_else(PoisonError::into_inner);
+    if *is_listening {
         return Ok(());
     }
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -183,6 +184,6 @@ fn listen() -> anyhow::Result<()> {
         })
     };
     thread::Builder::new().name("signals".into()).spawn(listening)?;
-    LISTENING.call_once(|| {});
+    *is_listening = true;
     Ok(())
 }

@@ -124,7 +124,8 @@ pub async fn run<D: Device>(
         let now = Instant::now();
         device.wake(now);
         let output = device.output(now);
-        if let Link::Up(stream) = &mut link
+        if !output.is_empty()
+            && let Link::Up(stream) = &mut link
             && port.has_host()
             && !send(stream, &output).await
         {

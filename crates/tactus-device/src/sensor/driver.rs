@@ -1,10 +1,10 @@
 //! The driver of all arrays: it runs a session over a link.
 
+use std::future::poll_fn;
 use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::Duration;
 
-use futures_util::FutureExt;
-use futures_util::future::BoxFuture;
 use tactus_schema::{DeviceTick, Frame, FrameFlags, Rig, TimeStamp, pb};
 use tactus_wire::sensor::{Action, Cause, Loss, Reading, Session};
 use tokio::sync::mpsc;
@@ -47,6 +47,11 @@ pub struct ArrayExpectation {
 }
 
 impl SensorDriver {
+    /// Waits for the next event. Cancel-safe.
+    pub async fn next(&mut self) -> SensorEvent {
+        poll_fn(|context| self.poll_next(context)).await
+    }
+
     /// Starts the task that owns the sensor. It ends when the returned value is dropped.
     ///
     /// A device that is silent or sends nothing new for a second is reported as [`ErrorKind::Timeout`]. One that does not
@@ -80,15 +85,12 @@ impl SensorDriver {
 }
 
 impl Sensor for SensorDriver {
-    fn next(&mut self) -> BoxFuture<'_, SensorEvent> {
-        async {
-            match self.events.recv().await {
-                Some(event) => event,
-                // The task ends only with this reader, or with the runtime.
-                None => std::future::pending().await,
-            }
+    fn poll_next(&mut self, context: &mut Context<'_>) -> Poll<SensorEvent> {
+        match self.events.poll_recv(context) {
+            Poll::Ready(Some(event)) => Poll::Ready(event),
+            // The task ends only with this reader, or with the runtime.
+            Poll::Ready(None) | Poll::Pending => Poll::Pending,
         }
-        .boxed()
     }
 }
 
@@ -171,7 +173,7 @@ impl Driver {
         let mut actions = session.start(since_start(now));
         loop {
             let mut together = actions.iter().filter(|action| matches!(action, Action::Reading(_))).count();
-            for action in actions {
+            for action in actions.drain(..) {
                 match action {
                     Action::Send(bytes) => {
                         if let Err(error) = link.send(&bytes).await {
@@ -203,20 +205,20 @@ impl Driver {
                 () = self.events.closed() => return Err(Unread),
                 event = link.next(session.deadline()) => event,
             };
-            actions = match event {
+            match event {
                 Ok((stamp, LinkEvent::Received(bytes))) => {
                     now = stamp;
-                    session.receive(since_start(now), bytes)
+                    session.receive_into(since_start(now), bytes, &mut actions);
                 }
                 Ok((stamp, LinkEvent::Deadline)) => {
                     now = stamp;
-                    session.timer(since_start(now))
+                    actions = session.timer(since_start(now));
                 }
                 Err(error) => {
                     tracing::info!(device = self.device, quality = session.quality(), "sensor link ended");
                     return Ok(error);
                 }
-            };
+            }
         }
     }
 
@@ -282,12 +284,13 @@ impl Driver {
         if flags.contains(FrameFlags::NEW_EPOCH) {
             self.held.fill(0.0);
         }
-        for (element, (held, count)) in self.held.iter_mut().zip(&reading.counts).enumerate() {
+        for (element, (held, count)) in self.held.iter_mut().zip(reading.counts.iter()).enumerate() {
             if !is_listed(element, &reading.bad) {
                 *held = *count;
             }
         }
-        let counts: Arc<[f32]> = self.held.as_slice().into();
+        let counts: Arc<[f32]> =
+            if reading.bad.is_empty() { reading.counts } else { self.held.as_slice().into() };
         if counts.iter().any(|count| f64::from(count.abs()) >= self.expect.full_scale_counts) {
             flags = flags.with(FrameFlags::SATURATED);
         }
@@ -303,7 +306,8 @@ impl Driver {
             flags,
             lost_before: placement.lost_before,
             simulated: self.expect.simulated,
-            bad_elements: reading.bad.into(),
+            // No list takes no memory.
+            bad_elements: if reading.bad.is_empty() { Arc::default() } else { reading.bad.into() },
             temperature_c: reading.temperature_c,
         };
         let gap = placement.gap.map(SensorEvent::Gap);

@@ -24,7 +24,7 @@ use super::{ArrayExpectation, EVENTS_MAX, SensorDriver};
 use crate::transport::memory::{MemoryPort, pair};
 use crate::transport::serial::SerialConnector;
 use crate::transport::{ByteStream, Connect};
-use crate::{Clock, DeviceError, ErrorKind, Sensor, SensorCodec, SensorEvent};
+use crate::{Clock, DeviceError, ErrorKind, SensorCodec, SensorEvent};
 
 fn expectation() -> ArrayExpectation {
     ArrayExpectation {

@@ -1,6 +1,7 @@
 //! A sensor and a stage that exist only here, in virtual time, and a recording that remembers.
 
 use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use futures_util::FutureExt;
@@ -65,56 +66,57 @@ struct FakeSensor {
 }
 
 impl Sensor for FakeSensor {
-    fn next(&mut self) -> BoxFuture<'_, SensorEvent> {
-        async {
-            if !std::mem::replace(&mut self.told, true) {
-                return SensorEvent::Connected(pb::SensorInfo { rows: 6, cols: 8, ..Default::default() });
-            }
-            if let Some(frame) = self.pending.take() {
-                return SensorEvent::Frame(frame);
-            }
-            loop {
-                self.tick.tick().await;
-                let mut trouble = self.trouble.lock().unwrap();
-                self.seq += 1;
-                if std::mem::take(&mut trouble.panics) {
-                    drop(trouble);
-                    panic!("a driver that panics, for a test");
-                }
-                if trouble.silent {
-                    trouble.lose += 1;
-                    continue;
-                }
-                let lost = std::mem::take(&mut trouble.lose);
-                let depth_mm = trouble.stuck_depth_mm.unwrap_or(-self.stage.borrow().z_mm.min(0.0));
-                #[expect(clippy::cast_possible_truncation, reason = "a fake reading")]
-                let counts = vec![100.0 + 1000.0 * depth_mm as f32 + trouble.push_counts; 48];
-                let frame = Frame {
-                    seq: self.seq,
-                    epoch: 0,
-                    device_tick: None,
-                    received: self.clock.now(),
-                    counts: counts.into(),
-                    flags: FrameFlags::default(),
-                    lost_before: lost,
-                    simulated: true,
-                    bad_elements: [].into(),
-                    temperature_c: None,
-                };
-                if lost == 0 {
-                    return SensorEvent::Frame(frame);
-                }
-                let gap = pb::Gap {
-                    frames_lost: lost.into(),
-                    after_seq: self.seq - 1 - u64::from(lost),
-                    next_seq: self.seq,
-                    reason: "test".into(),
-                };
-                self.pending = Some(frame);
-                return SensorEvent::Gap(gap);
-            }
+    fn poll_next(&mut self, context: &mut Context<'_>) -> Poll<SensorEvent> {
+        if !std::mem::replace(&mut self.told, true) {
+            return Poll::Ready(SensorEvent::Connected(pb::SensorInfo {
+                rows: 6,
+                cols: 8,
+                ..Default::default()
+            }));
         }
-        .boxed()
+        if let Some(frame) = self.pending.take() {
+            return Poll::Ready(SensorEvent::Frame(frame));
+        }
+        loop {
+            ready!(self.tick.poll_tick(context));
+            let mut trouble = self.trouble.lock().unwrap();
+            self.seq += 1;
+            if std::mem::take(&mut trouble.panics) {
+                drop(trouble);
+                panic!("a driver that panics, for a test");
+            }
+            if trouble.silent {
+                trouble.lose += 1;
+                continue;
+            }
+            let lost = std::mem::take(&mut trouble.lose);
+            let depth_mm = trouble.stuck_depth_mm.unwrap_or(-self.stage.borrow().z_mm.min(0.0));
+            #[expect(clippy::cast_possible_truncation, reason = "a fake reading")]
+            let counts = vec![100.0 + 1000.0 * depth_mm as f32 + trouble.push_counts; 48];
+            let frame = Frame {
+                seq: self.seq,
+                epoch: 0,
+                device_tick: None,
+                received: self.clock.now(),
+                counts: counts.into(),
+                flags: FrameFlags::default(),
+                lost_before: lost,
+                simulated: true,
+                bad_elements: [].into(),
+                temperature_c: None,
+            };
+            if lost == 0 {
+                return Poll::Ready(SensorEvent::Frame(frame));
+            }
+            let gap = pb::Gap {
+                frames_lost: lost.into(),
+                after_seq: self.seq - 1 - u64::from(lost),
+                next_seq: self.seq,
+                reason: "test".into(),
+            };
+            self.pending = Some(frame);
+            return Poll::Ready(SensorEvent::Gap(gap));
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The host's side: it only listens, because the board streams by itself.
 
 use core::time::Duration;
+use std::sync::Arc;
 
 use super::{DecodedFrame, Decoder, DecoderStats};
 use crate::sensor::{
@@ -26,14 +27,14 @@ impl Session {
     fn read(&mut self, frame: &DecodedFrame) -> Reading {
         let last_stats = core::mem::replace(&mut self.last_stats, self.decoder.stats());
         let damaged = core::mem::replace(&mut self.any_frame, true) && last_stats != self.last_stats;
-        let counts: Vec<f32> =
+        let counts: Arc<[f32]> =
             frame.magnetometers.iter().flat_map(|magnetometer| magnetometer.field_ut).collect();
         let is_bad = |(_, count): &(u32, &f32)| !count.is_finite();
         Reading {
             tick: None,
             new_clock: false,
             evidence: if damaged { LossEvidence::Damage } else { LossEvidence::TimesOnly },
-            bad: (0..).zip(&counts).filter(is_bad).map(|(element, _)| element).collect(),
+            bad: (0..).zip(counts.iter()).filter(is_bad).map(|(element, _)| element).collect(),
             counts,
             temperature_c: frame.temperature_c(),
         }
@@ -78,8 +79,7 @@ impl sensor::Session for Session {
         Vec::new()
     }
 
-    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
-        let mut actions = Vec::new();
+    fn receive_into(&mut self, now: Duration, bytes: &[u8], actions: &mut Vec<Action>) {
         self.watchdog.bytes(now);
         self.decoder.push(bytes);
         while let Some(frame) = self.decoder.next_frame() {
@@ -88,7 +88,6 @@ impl sensor::Session for Session {
             }
             actions.push(Action::Reading(self.read(&frame)));
         }
-        actions
     }
 
     fn timer(&mut self, now: Duration) -> Vec<Action> {

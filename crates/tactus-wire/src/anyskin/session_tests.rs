@@ -13,7 +13,7 @@ fn bytes(field_ut: [f32; 3]) -> Vec<u8> {
 }
 
 fn reading(evidence: LossEvidence) -> Action {
-    let counts = [1.5, -2.5, 3.0].repeat(5);
+    let counts = [1.5, -2.5, 3.0].repeat(5).into();
     Action::Reading(Reading {
         tick: None,
         new_clock: false,

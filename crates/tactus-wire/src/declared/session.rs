@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::ticks::TickLength;
 use super::{DecodedFrame, Decoder, DecoderStats, Format, Framing};
 use crate::sensor::{
-    self, Action, Cause, Loss, LossEvidence, NO_FRAME_AFTER, Reading, SILENT_AFTER, StreamFault, Watchdog,
+    self, Action, Cause, Loss, LossEvidence, Memory, NO_FRAME_AFTER, Reading, SILENT_AFTER, StreamFault,
+    Watchdog,
 };
 
 /// The longest delay of a frame on its way. If the device's clock advances between two frames by more than this beyond
@@ -25,6 +26,7 @@ pub struct Session {
     last_stats: DecoderStats,
     /// The device repeats frames: its frame count does not count readings.
     repeats: bool,
+    memory: Memory,
 }
 
 /// The previous frame.
@@ -46,6 +48,7 @@ impl Session {
             previous: Previous::default(),
             last_stats: DecoderStats::default(),
             repeats: false,
+            memory: Memory::default(),
         }
     }
 
@@ -102,9 +105,8 @@ impl sensor::Session for Session {
         Vec::new()
     }
 
-    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
-        let mut actions = Vec::new();
-        let Self { decoder, watchdog, ticks, wrap, previous, last_stats, repeats } = self;
+    fn receive_into(&mut self, now: Duration, bytes: &[u8], actions: &mut Vec<Action>) {
+        let Self { decoder, watchdog, ticks, wrap, previous, last_stats, repeats, memory } = self;
         watchdog.bytes(now);
         decoder.push(bytes);
         while let Some(frame) = decoder.next_frame() {
@@ -122,7 +124,7 @@ impl sensor::Session for Session {
                 tick: frame.tick.map(|tick| ticks.convert(tick)),
                 new_clock,
                 evidence: LossEvidence::TimesOnly,
-                counts: frame.counts.to_vec(),
+                counts: memory.counts(frame.counts.len(), |counts| counts.copy_from_slice(frame.counts)),
                 bad: frame.bad.iter().filter_map(|element| u32::try_from(*element).ok()).collect(),
                 temperature_c: None,
             };
@@ -139,7 +141,6 @@ impl sensor::Session for Session {
             }
             actions.push(Action::Reading(reading));
         }
-        actions
     }
 
     fn timer(&mut self, now: Duration) -> Vec<Action> {

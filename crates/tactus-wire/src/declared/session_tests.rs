@@ -60,7 +60,7 @@ fn ticks_become_nanoseconds_and_bad_elements_are_listed() {
         tick: Some(62_500),
         new_clock: true,
         evidence: LossEvidence::TimesOnly,
-        counts: vec![7.0, 65_535.0],
+        counts: [7.0, 65_535.0].into(),
         bad: vec![1],
         temperature_c: None,
     };

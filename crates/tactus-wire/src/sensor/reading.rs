@@ -1,5 +1,7 @@
 //! One reading of an array, and how many readings are missing before it.
 
+use std::sync::Arc;
+
 /// One reading of all elements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
@@ -11,7 +13,7 @@ pub struct Reading {
     /// What shows whether readings are missing before this one.
     pub evidence: LossEvidence,
     /// One for each element, row-major. The counts of [`bad`](Self::bad) elements have no meaning.
-    pub counts: Vec<f32>,
+    pub counts: Arc<[f32]>,
     /// Indices of the elements that were not read, ascending.
     pub bad: Vec<u32>,
     /// Temperature of the sensor in degrees Celsius, the mean where it has several; finite. `None` if it tells none.

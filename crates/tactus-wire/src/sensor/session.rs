@@ -24,8 +24,15 @@ pub trait Session {
     /// Opens the conversation.
     fn start(&mut self, now: Duration) -> Vec<Action>;
 
-    /// Takes the bytes of one read.
-    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action>;
+    /// Takes the bytes of one read, and appends the actions that follow to `actions`, which is empty.
+    fn receive_into(&mut self, now: Duration, bytes: &[u8], actions: &mut Vec<Action>);
+
+    /// As [`receive_into`](Self::receive_into), with a new list.
+    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
+        let mut actions = Vec::new();
+        self.receive_into(now, bytes, &mut actions);
+        actions
+    }
 
     /// Does what is due at [`deadline`](Self::deadline). Before that it does nothing.
     fn timer(&mut self, now: Duration) -> Vec<Action>;

@@ -289,17 +289,15 @@ impl sensor::Session for Session {
         vec![self.ask(now, 0)]
     }
 
-    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
-        let mut actions = Vec::new();
+    fn receive_into(&mut self, now: Duration, bytes: &[u8], actions: &mut Vec<Action>) {
         self.decoder.push(bytes);
         // The decoder is moved out of `self`, because its replies borrow from it.
         let mut decoder = core::mem::take(&mut self.decoder);
         while let Some(reply) = decoder.next_reply() {
-            self.handle(now, &reply, &mut actions);
+            self.handle(now, &reply, actions);
         }
         self.decoder = decoder;
-        self.note_strays(&actions);
-        actions
+        self.note_strays(actions);
     }
 
     fn timer(&mut self, now: Duration) -> Vec<Action> {

@@ -56,7 +56,7 @@ fn reading(tick: u64, lost: u64, answered: [bool; 2]) -> Action {
         tick: Some(tick),
         new_clock: false,
         evidence: LossEvidence::Counted { lost, wrap: u64::MAX },
-        counts: answered.map(|answered| if answered { 300.0 } else { 0.0 }).to_vec(),
+        counts: answered.map(|answered| if answered { 300.0 } else { 0.0 }).into(),
         bad: (0..).zip(answered).filter(|(_, answered)| !answered).map(|(element, _)| element).collect(),
         temperature_c: None,
     })

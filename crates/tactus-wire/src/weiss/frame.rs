@@ -40,28 +40,65 @@ impl DecodedFrame {
     /// # Errors
     /// If it is another packet, is damaged, or has another number of elements.
     pub fn parse(packet: &Packet<'_>, elements: usize) -> Result<Self, FrameError> {
+        let frame = PackedFrame::parse(packet, elements)?;
+        let counts = if frame.run_length { frame.runs().collect() } else { frame.words().collect() };
+        Ok(Self { timestamp_ms: frame.timestamp_ms, run_length: frame.run_length, counts })
+    }
+}
+
+/// A frame that was checked, with its counts as they are in the packet.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PackedFrame<'a> {
+    /// See [`DecodedFrame`].
+    pub(crate) timestamp_ms: u32,
+    run_length: bool,
+    texels: &'a [[u8; 2]],
+}
+
+impl<'a> PackedFrame<'a> {
+    /// Checks a frame of exactly `elements` counts.
+    ///
+    /// # Errors
+    /// As [`DecodedFrame::parse`].
+    pub(crate) fn parse(packet: &Packet<'a>, elements: usize) -> Result<Self, FrameError> {
         if packet.id != id::FRAME {
             return Err(FrameError::NotAFrame { id: packet.id });
         }
         let length = FrameError::Length { bytes: packet.payload.len() };
         let (timestamp, rest) = packet.payload.split_first_chunk::<4>().ok_or(length)?;
         let (flags, texels) = rest.split_first().ok_or(length)?;
-        let (words, []) = texels.as_chunks::<2>() else { return Err(length) };
-        let words = words.iter().map(|word| u16::from_le_bytes(*word));
+        let (texels, []) = texels.as_chunks::<2>() else { return Err(length) };
         let run_length = flags & RUN_LENGTH != 0;
-        let mut counts = Vec::with_capacity(elements);
-        if run_length {
-            for word in words {
-                let repeats = usize::from(word >> 12);
-                counts.resize(counts.len() + repeats, word & MAX_RUN_COUNTS);
-            }
+        let frame = Self { timestamp_ms: u32::from_le_bytes(*timestamp), run_length, texels };
+        let found = if run_length { frame.words().map(repeats).sum() } else { texels.len() };
+        if found == elements { Ok(frame) } else { Err(FrameError::Elements { expected: elements, found }) }
+    }
+
+    /// Writes the counts into `counts`, of which there is one for each element.
+    pub(crate) fn write_to(self, counts: &mut [f32]) {
+        if self.run_length {
+            write(self.runs(), counts);
         } else {
-            counts.extend(words);
+            write(self.words(), counts);
         }
-        if counts.len() != elements {
-            return Err(FrameError::Elements { expected: elements, found: counts.len() });
-        }
-        Ok(Self { timestamp_ms: u32::from_le_bytes(*timestamp), run_length, counts })
+    }
+
+    fn words(self) -> impl Iterator<Item = u16> + 'a {
+        self.texels.iter().map(|word| u16::from_le_bytes(*word))
+    }
+
+    fn runs(self) -> impl Iterator<Item = u16> + 'a {
+        self.words().flat_map(|word| std::iter::repeat_n(word & MAX_RUN_COUNTS, repeats(word)))
+    }
+}
+
+fn repeats(word: u16) -> usize {
+    usize::from(word >> 12)
+}
+
+fn write(from: impl Iterator<Item = u16>, counts: &mut [f32]) {
+    for (count, read) in counts.iter_mut().zip(from) {
+        *count = f32::from(read);
     }
 }
 

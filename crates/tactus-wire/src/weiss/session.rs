@@ -4,10 +4,10 @@ use core::time::Duration;
 
 use super::ticks::{TickOrder, TickUnwrapper};
 use super::{
-    Checksum, ControllerInfo, DecodedFrame, Decoder, ErrorCode, FrameError, InfoError, MatrixInfo, Packet,
+    Checksum, ControllerInfo, Decoder, ErrorCode, FrameError, InfoError, MatrixInfo, PackedFrame, Packet,
     SensorInfo, acquire, id, query_controller, query_matrix, query_sensor,
 };
-use crate::sensor::{self, Action, Cause, Loss, LossEvidence, Reading};
+use crate::sensor::{self, Action, Cause, Loss, LossEvidence, Memory, Reading};
 
 /// Length of a tick of the controller's clock.
 pub const TICK: Duration = Duration::from_millis(1);
@@ -25,6 +25,7 @@ pub struct Session {
     config: Config,
     decoder: Decoder,
     ticks: TickUnwrapper,
+    memory: Memory,
     state: State,
     device: Device,
     /// Frames that were dropped because they came twice or late.
@@ -100,6 +101,7 @@ impl Session {
             config,
             decoder: Decoder::with_max_payload(max_payload_bytes).with_checksum(config.checksum),
             ticks: TickUnwrapper::default(),
+            memory: Memory::default(),
             state: State::Over,
             device: Device::default(),
             stale_frames: 0,
@@ -165,8 +167,9 @@ impl Session {
         packet: &Packet<'_>,
         actions: &mut Vec<Action>,
     ) -> Result<(), SessionError> {
-        let DecodedFrame { timestamp_ms, counts, .. } = DecodedFrame::parse(packet, self.config.elements())?;
-        let (tick_ms, new_clock) = match self.ticks.place(now, timestamp_ms) {
+        let elements = self.config.elements();
+        let frame = PackedFrame::parse(packet, elements)?;
+        let (tick_ms, new_clock) = match self.ticks.place(now, frame.timestamp_ms) {
             TickOrder::Next { tick_ms } => (tick_ms, false),
             TickOrder::NewClock { tick_ms } => (tick_ms, true),
             TickOrder::Stale => {
@@ -183,7 +186,7 @@ impl Session {
             tick: Some(tick_ms),
             new_clock,
             evidence: LossEvidence::TimesOnly,
-            counts: counts.into_iter().map(f32::from).collect(),
+            counts: self.memory.counts(elements, |counts| frame.write_to(counts)),
             bad: Vec::new(),
             temperature_c: None,
         }));
@@ -218,8 +221,7 @@ impl sensor::Session for Session {
         vec![self.ask(now, Query::SwitchOff, 1)]
     }
 
-    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
-        let mut actions = Vec::new();
+    fn receive_into(&mut self, now: Duration, bytes: &[u8], actions: &mut Vec<Action>) {
         let boots_before = self.decoder.stats().boot_messages;
         self.decoder.push(bytes);
         // The decoder is moved out of `self`, because its packets borrow from it.
@@ -227,16 +229,15 @@ impl sensor::Session for Session {
         while let Some(packet) = decoder.next_packet() {
             // The decoder counts wrong checksums. A lost reply is requested again.
             let Ok(packet) = packet else { continue };
-            if let Err(error) = self.handle(now, &packet, &mut actions) {
+            if let Err(error) = self.handle(now, &packet, actions) {
                 self.state = State::Over;
                 actions.push(Action::Failed(error.into()));
             }
         }
         self.decoder = decoder;
         if self.decoder.stats().boot_messages > boots_before {
-            self.restart(now, &mut actions);
+            self.restart(now, actions);
         }
-        actions
     }
 
     fn timer(&mut self, now: Duration) -> Vec<Action> {

@@ -64,7 +64,7 @@ fn reading(tick_ms: u64, new_clock: bool) -> Action {
         tick: Some(tick_ms),
         new_clock,
         evidence: LossEvidence::TimesOnly,
-        counts: vec![1.0, 2.0],
+        counts: [1.0, 2.0].into(),
         bad: vec![],
         temperature_c: None,
     })

@@ -6,7 +6,7 @@ use tokio::io::{AsyncWriteExt, DuplexStream};
 use tokio::time::{Instant, sleep};
 
 use crate::transport::memory::{MemoryPort, pair};
-use crate::{ArrayExpectation, Clock, ErrorKind, Sensor, SensorCodec, SensorDriver, SensorEvent};
+use crate::{ArrayExpectation, Clock, ErrorKind, SensorCodec, SensorDriver, SensorEvent};
 
 const PERIOD: Duration = Duration::from_millis(10);
 

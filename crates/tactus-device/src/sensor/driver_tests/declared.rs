@@ -7,7 +7,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use tokio::time::{Instant, sleep};
 
 use crate::transport::memory::{MemoryPort, pair};
-use crate::{ArrayExpectation, Clock, ErrorKind, Sensor, SensorCodec, SensorDriver, SensorEvent};
+use crate::{ArrayExpectation, Clock, ErrorKind, SensorCodec, SensorDriver, SensorEvent};
 
 const COUNTED: &str = r#"
 schema = "tactus.link/1"

@@ -6,7 +6,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use tokio::time::sleep;
 
 use crate::transport::memory::{MemoryPort, pair};
-use crate::{ArrayExpectation, Clock, ErrorKind, Sensor, SensorCodec, SensorDriver, SensorEvent};
+use crate::{ArrayExpectation, Clock, ErrorKind, SensorCodec, SensorDriver, SensorEvent};
 
 fn start(addresses: &[u8]) -> (SensorDriver, MemoryPort) {
     let (connector, port) = pair("sensor");

@@ -1,0 +1,34 @@
+//! Memory for the counts of readings, used again and again.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Readings whose memory is kept; a service holds a few at a time.
+const KEPT_MAX: usize = 64;
+
+/// Makes the counts of a reading, once nobody holds that of an earlier one any more, in its memory.
+#[derive(Debug, Default)]
+pub(crate) struct Memory {
+    /// The oldest first: it is the first that nobody holds.
+    kept: VecDeque<Arc<[f32]>>,
+}
+
+impl Memory {
+    /// So many counts, written by `write`.
+    pub(crate) fn counts(&mut self, elements: usize, write: impl FnOnce(&mut [f32])) -> Arc<[f32]> {
+        let is_free = |kept: &mut Arc<[f32]>| kept.len() == elements && Arc::get_mut(kept).is_some();
+        let free = self.kept.pop_front_if(is_free);
+        let mut counts = free.unwrap_or_else(|| std::iter::repeat_n(0.0, elements).collect());
+        if let Some(counts) = Arc::get_mut(&mut counts) {
+            write(counts);
+        }
+        if self.kept.len() < KEPT_MAX {
+            self.kept.push_back(Arc::clone(&counts));
+        }
+        counts
+    }
+}
+
+#[cfg(test)]
+#[path = "memory_tests.rs"]
+mod tests;
