@@ -133,6 +133,8 @@ pub(crate) struct Grown {
     pub(crate) at: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
+    /// The last model of which each class held its place, with these equivalents.
+    pub(super) held: Option<Held>,
     /// The models of the rounds: the base, and each with one more class.
     path: Vec<Fitted>,
     /// Classes that lost against a rival without a name, or are too small beside another.
@@ -143,6 +145,13 @@ pub(crate) struct Grown {
     pub(super) barred: Vec<(Vec<&'static str>, &'static str)>,
 }
 
+/// A model of which each class held its place.
+pub(super) struct Held {
+    pub(super) at: Fitted,
+    /// Number of rounds before.
+    pub(super) rounds: usize,
+}
+
 impl From<Fitted> for Grown {
     fn from(base: Fitted) -> Self {
         Self {
@@ -150,6 +159,7 @@ impl From<Fitted> for Grown {
             at: base,
             rounds: Vec::new(),
             equivalent: Equivalent::new(),
+            held: None,
             refused: Vec::new(),
             exchanged: Vec::new(),
             barred: Vec::new(),

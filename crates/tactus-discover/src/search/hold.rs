@@ -5,8 +5,8 @@ use super::contests::Contest;
 use super::evidence::Set;
 use super::given_up::{Because, GivenUp};
 use super::grow::{
-    ALPHA, Alike, Beside, FORM_SHARE, Grown, LN_ODDS_LEAST, POLISH_ROUNDS, PROMISE_SHARE, Search,
-    TRIAL_ROUNDS, is_exact, names, without,
+    ALPHA, Alike, Beside, Equivalent, FORM_SHARE, Grown, Held, LN_ODDS_LEAST, POLISH_ROUNDS, PROMISE_SHARE,
+    Search, TRIAL_ROUNDS, is_exact, names, without,
 };
 use super::pass::{Pass, rivals_win};
 use super::varying::varying_effect;
@@ -29,11 +29,15 @@ const SET_UNITS: f64 = 3.0;
 impl Search<'_> {
     /// Lets each class hold its place: against the model without it, rivals without a name, and other classes.
     pub(super) fn hold(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
+        let barred = grown.barred.len();
         let mut exchanges_left = EXCHANGES_MAX;
         'again: loop {
+            if self.is_back(grown, barred) {
+                return Ok(());
+            }
             // Whether the model leaves something, once that is asked.
             let mut leaves: Option<bool> = None;
-            grown.equivalent.clear();
+            let mut equivalent = Equivalent::new();
             let names = names(&grown.at.parameters, self.known_terms);
             self.reporter.enter(Stage::Withdrawing, "withdrawing each name");
             let without = |name: &&'static str| {
@@ -100,10 +104,33 @@ impl Search<'_> {
                         same.push((other, fitted));
                     }
                 }
-                grown.equivalent.insert(name, Alike { without: less, same, probabilities, rivals, classes });
+                equivalent.insert(name, Alike { without: less, same, probabilities, rivals, classes });
             }
+            grown.equivalent = equivalent;
+            grown.held = Some(Held { at: grown.at.clone(), rounds: grown.rounds.len() });
             return Ok(());
         }
+    }
+
+    /// True if the present model has the names of the last one that was held: then all that was added to that has lost its place, and the
+    /// better fit of the two stays. If some of it lost against a rival, which are now more than `barred`, none of it is tried beside these
+    /// names again.
+    fn is_back(&self, grown: &mut Grown, barred: usize) -> bool {
+        let present = self.sorted_names(&grown.at);
+        let Some(held) = grown.held.as_mut().filter(|held| self.sorted_names(&held.at) == present) else {
+            return false;
+        };
+        if held.at.cost <= grown.at.cost {
+            grown.at = held.at.clone();
+        } else {
+            held.at = grown.at.clone();
+        }
+        if grown.barred.len() > barred {
+            let added = grown.rounds[held.rounds..].iter().filter_map(|tried| tried.round.taken);
+            let lost = added.filter(|name| !present.contains(name));
+            grown.barred.extend(lost.map(|name| (present.clone(), name)));
+        }
+        true
     }
 
     /// A model fitted from these values, or the one that the rounds passed.
