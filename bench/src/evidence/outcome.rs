@@ -9,7 +9,7 @@ use tactus_sets::Label;
 use super::campaign::{Campaign, Planned};
 use super::drafts::{Covariate, Draft};
 use super::run::{Places, Ran};
-use super::score::SHRINK_ERROR_MAX;
+use super::score::{SHRINK_ERROR_MAX, Z_NAMEABLE};
 
 /// The truth of a set, and what was reported.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +55,8 @@ pub struct Truth {
     pub is_library_point: bool,
     /// Separation from the base model after gains, offsets and spread are fitted.
     pub z: f64,
-    /// Separation from the nearest wrong effect ([`ClassFits::z_name`](tactus_sets::ClassFits::z_name)), if it is computed.
+    /// Separation from the nearest wrong effect ([`ClassFits::z_name`](tactus_sets::ClassFits::z_name)), if it is computed: of physics
+    /// outside the library from the nearest effect.
     pub z_name: Option<f64>,
     /// Share of the gap that the effect's own best fit closes without noise, if it is computed.
     pub own_shrink: Option<f64>,
@@ -130,6 +131,11 @@ impl Outcome {
     /// Separation of the hidden physics from the nearest wrong effect, of the least separate one; `None` if it is not computed.
     pub fn z_name(&self) -> Option<f64> {
         self.truths.iter().map(|truth| truth.z_name).reduce(|one, other| Some(one?.min(other?)))?
+    }
+
+    /// True if that is as large as a name asks for.
+    pub fn is_apart(&self) -> bool {
+        self.z_name().is_some_and(|z| z >= Z_NAMEABLE)
     }
 
     /// Separation of the weakest hidden physics; infinite if there is none.
@@ -230,14 +236,15 @@ fn one(set: &Planned, places: &Places) -> Result<Outcome> {
 
 fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryReport>) -> Outcome {
     let truth = |dosed: &tactus_sets::PhysicsLabel| {
-        let of = dosed.class_fits().zip(dosed.effect.as_deref());
+        let fits = dosed.class_fits();
+        let effect = dosed.effect.as_deref();
         Truth {
             physics: dosed.id.clone(),
             effect: dosed.effect.clone(),
             is_library_point: dosed.is_library_point,
             z: dosed.z_beyond_spread,
-            z_name: of.as_ref().and_then(|(fits, effect)| fits.z_name(effect)),
-            own_shrink: of.as_ref().and_then(|(fits, effect)| fits.shrink(effect)),
+            z_name: fits.as_ref().and_then(|fits| fits.z_name(effect)),
+            own_shrink: fits.as_ref().zip(effect).and_then(|(fits, effect)| fits.shrink(effect)),
         }
     };
     let first_effect = label.physics.first().and_then(|dosed| dosed.effect.as_deref());

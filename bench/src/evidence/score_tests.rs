@@ -100,16 +100,18 @@ fn outside_the_library_the_verdict_counts() {
     let outside = |verdict: &str, names: &[(&str, &[&str])]| {
         of(Campaign::Outside, "outside/x", set(&[None], names, verdict))
     };
-    let sets = [
+    let mut sets = [
         outside("unexplained", &[]),
         outside("partly-explained", &[("backlash", &[])]),
         outside("nothing-missing", &[]),
         outside("unexplained", &[]),
     ];
+    sets[1].truths[0].z_name = Some(4.0);
     let scores = Scores::new(&sets);
     let all = &scores.outside["all"];
     assert_eq!((all.unexplained.hits, all.wrong.hits, all.partly.hits, all.missed.hits), (2, 1, 1, 1));
     assert_eq!(scores.outside["made-up"].unexplained.of, 4);
+    assert_eq!((scores.outside[APART].wrong.hits, scores.outside[APART].wrong.of), (0, 3));
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn one(set: &Planned, places: &Places, progress: &(dyn Fn(&str) + Sync)) -> Resu
     let mut label: Label = parsed(&path)?;
     let mut is_new = false;
     for dosed in &mut label.physics {
-        if dosed.effect.is_some() && dosed.z_of_effects.is_empty() {
+        if dosed.z_of_effects.is_empty() {
             dosed.z_of_effects = set.recipe.class_fits(dosed).with_context(|| set.id.clone())?.effects;
             is_new = true;
         }

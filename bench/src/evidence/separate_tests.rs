@@ -24,7 +24,7 @@ fn a_label_gets_its_separation_once() -> Result<()> {
     let fits = label.physics[0].class_fits().context("it has them")?;
     assert_eq!(done.into_inner(), 1);
     assert_eq!(fits.effects.len(), tactus_model::effect::REGISTRY.len());
-    let nearest = fits.z_name("surface-offset").context("it is an effect")?;
+    let nearest = fits.z_name(Some("surface-offset")).context("it is an effect")?;
     assert!(nearest > 0.0 && nearest <= 1.001 * fits.base, "{nearest} of {}", fits.base);
     Ok(())
 }

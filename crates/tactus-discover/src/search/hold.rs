@@ -216,3 +216,7 @@ fn credible(probabilities: &[(&'static str, f64)], mut others: Vec<Beside>) -> V
     }
     same
 }
+
+#[cfg(test)]
+#[path = "hold_tests.rs"]
+mod tests;
