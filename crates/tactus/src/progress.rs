@@ -60,6 +60,12 @@ struct DrawingOrder {
 /// Lines that wait for a terminal.
 const LINES_MAX: usize = 16;
 
+/// Resolution of a bar that shows a share.
+const STEPS: u64 = 1000;
+
+/// So that the time goes on without news.
+const TICK: Duration = Duration::from_secs(1);
+
 /// Longest wait for a terminal at the end of a run.
 const LAST_DRAWING: Duration = Duration::from_millis(200);
 
@@ -148,7 +154,7 @@ fn target(silent: bool) -> ProgressDrawTarget {
 fn styled(bar: &ProgressBar, template: &str) {
     let left = |state: &ProgressState, to: &mut dyn fmt::Write| {
         let (done, elapsed) = (f64::from(state.fraction()), state.elapsed());
-        if elapsed >= ComputationProgress::TICK && done >= 0.01 {
+        if elapsed >= TICK && done >= 0.01 {
             // Nothing can be done about a line that does not fit.
             let _full = write!(to, "{} left", duration(elapsed.as_secs_f64() * (1.0 - done) / done));
         }
@@ -158,10 +164,10 @@ fn styled(bar: &ProgressBar, template: &str) {
     }
 }
 
-/// Shows a share, 0 to 1, of a bar of [`ComputationProgress::STEPS`].
+/// Shows a share, 0 to 1, of a bar of [`STEPS`].
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to STEPS")]
 fn set_share(bar: &ProgressBar, share: f64) {
-    bar.set_position((share.clamp(0.0, 1.0) * ComputationProgress::STEPS as f64) as u64);
+    bar.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
 }
 
 /// Draws until the run is over.
@@ -181,11 +187,11 @@ fn draw(next: &Next, silent: bool, title: String) {
         }
         if let Some(SoFar { presses, share }) = rehearsed.filter(|_| is_rehearsing) {
             // The time goes on without news.
-            bar.enable_steady_tick(ComputationProgress::TICK);
+            bar.enable_steady_tick(TICK);
             bar.set_message(if presses > 0 { format!("{presses} presses so far") } else { String::new() });
             if let Some(share) = share {
                 if bar.length().is_none() {
-                    bar.set_length(ComputationProgress::STEPS);
+                    bar.set_length(STEPS);
                     styled(&bar, "{prefix}dry run  {bar:30.cyan/dim} {percent:>3} %  {left}");
                 }
                 set_share(&bar, share);
@@ -223,50 +229,18 @@ fn show(bar: &ProgressBar, state: &RunState) {
     });
 }
 
-/// Progress bar of a computation in steps: what share of them is done, the time so far, the current step. Hidden where [`RunProgress`] is.
-#[derive(Debug)]
-pub(crate) struct ComputationProgress {
-    bar: ProgressBar,
-}
-
-impl ComputationProgress {
-    /// Resolution of the bar.
-    const STEPS: u64 = 1000;
-    /// So that the time so far goes on in a long step.
-    const TICK: Duration = Duration::from_secs(1);
-    pub(crate) fn new(silent: bool) -> Self {
-        // Cleared, too, when an error ends the computation.
-        let bar = ProgressBar::with_draw_target(Some(Self::STEPS), target(silent))
-            .with_finish(ProgressFinish::AndClear);
-        styled(&bar, "{bar:30.cyan/dim} {percent:>3} %  {elapsed:>4}  {msg}");
-        bar.enable_steady_tick(Self::TICK);
-        Self { bar }
-    }
-
-    /// Shows the current step and the share done, 0 to 1.
-    pub(crate) fn show(&self, what: &str, share: f64) {
-        set_share(&self.bar, share);
-        self.bar.set_message(what.to_owned());
-    }
-
-    /// Removes the bar.
-    pub(crate) fn clear(&self) {
-        self.bar.finish_and_clear();
-    }
-}
-
-/// Work of unknown length: what it is, and the time so far. While it reads files ([`Busy::reads`]), the share of them and the time left.
-/// Hidden where [`RunProgress`] is; ends with this.
+/// Work of unknown length: what it is, and the time so far. Where a share is known, as while it reads files ([`Busy::reads`]), that and the time
+/// left. Hidden where [`RunProgress`] is; ends with this, also when an error ends the work.
 #[derive(Debug)]
 pub(crate) struct Busy(ProgressBar);
 
 impl Busy {
     pub(crate) fn with(what: &'static str, silent: bool) -> Self {
-        let bar = ProgressBar::with_draw_target(Some(ComputationProgress::STEPS), target(silent))
-            .with_finish(ProgressFinish::AndClear);
+        let bar =
+            ProgressBar::with_draw_target(Some(STEPS), target(silent)).with_finish(ProgressFinish::AndClear);
         let busy = Self(bar);
         busy.goes_on(what);
-        busy.0.enable_steady_tick(ComputationProgress::TICK);
+        busy.0.enable_steady_tick(TICK);
         busy
     }
 
@@ -281,9 +255,15 @@ impl Busy {
         show_share(&self.0, share);
     }
 
+    /// As [`Busy::shows`], with the present step.
+    pub(crate) fn shows_step(&self, what: &str, share: f64) {
+        self.0.set_message(what.to_owned());
+        self.shows(share);
+    }
+
     /// Shows work that follows, with the time since the beginning.
     pub(crate) fn goes_on(&self, what: &'static str) {
-        styled(&self.0, "{msg}  {elapsed:>4}");
+        styled(&self.0, "{elapsed:>4}  {msg}");
         self.0.set_message(what);
     }
 }
@@ -291,7 +271,7 @@ impl Busy {
 fn show_share(bar: &ProgressBar, share: f64) {
     // Only now, because not every job knows it.
     if bar.position() == 0 {
-        styled(bar, "{msg}  {bar:30.cyan/dim} {percent:>3} %  {left}");
+        styled(bar, "{bar:30.cyan/dim} {percent:>3} %  {left:<13}  {msg}");
     }
     set_share(bar, share);
 }

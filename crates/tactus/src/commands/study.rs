@@ -20,7 +20,7 @@ use super::calibrate::{self, Calibrated};
 use crate::cli::{Common, StudyArgs};
 use crate::exit::Exit;
 use crate::output::{self, duration, say, say_next};
-use crate::progress::{Busy, ComputationProgress};
+use crate::progress::Busy;
 use steps::{CompletedStep, StudySteps};
 
 /// Figures computed from the model alone. Figures 2 and 5 come from the calibration, Figure 8 from the rig's images.
@@ -48,13 +48,13 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
         );
         None
     };
-    let progress = ComputationProgress::new(common.json);
+    let busy = Busy::with("figures", common.json);
     let mut figures = figures::finished(&FIGURES, |drawn| {
-        progress.show(drawn.title, drawn.finished as f64 / (drawn.figures + 1) as f64);
+        busy.shows_step(drawn.title, drawn.finished as f64 / (drawn.figures + 1) as f64);
     })?;
-    progress.show("mechanics and acuity", FIGURES.len() as f64 / (FIGURES.len() + 1) as f64);
+    busy.shows_step("mechanics and acuity", FIGURES.len() as f64 / (FIGURES.len() + 1) as f64);
     let quantities = quantities::quantities(&calibrated, truth.as_ref(), images.as_ref())?;
-    progress.clear();
+    drop(busy);
     figures.extend(images.into_iter().flat_map(|images| images.figures));
     let mut warnings: Vec<String> = taken.iter().filter_map(|taken| taken.degraded.clone()).collect();
     let is_lossy = calibrated.is_lossy || !warnings.is_empty();

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use indicatif::{ProgressBar, ProgressFinish, ProgressState, ProgressStyle};
 use tactus_discover::{Progress, TimeLeft};
 
-use super::{ComputationProgress, set_share, target};
+use super::{STEPS, TICK, set_share, target};
 
 /// Progress bar of a discovery: the share that is probably done, the time so far and left, the current activity. Hidden where
 /// [`RunProgress`](super::RunProgress) is; ends with this.
@@ -21,8 +21,8 @@ pub(crate) struct DiscoveryProgress {
 impl DiscoveryProgress {
     /// Time begins now.
     pub(crate) fn new(silent: bool) -> Self {
-        let bar = ProgressBar::with_draw_target(Some(ComputationProgress::STEPS), target(silent))
-            .with_finish(ProgressFinish::AndClear);
+        let bar =
+            ProgressBar::with_draw_target(Some(STEPS), target(silent)).with_finish(ProgressFinish::AndClear);
         let left = Arc::<Mutex<Option<TimeLeft>>>::default();
         let shown = Arc::clone(&left);
         let range = move |state: &ProgressState, to: &mut dyn fmt::Write| {
@@ -36,7 +36,7 @@ impl DiscoveryProgress {
         ) {
             bar.set_style(style.with_key("range", range));
         }
-        bar.enable_steady_tick(ComputationProgress::TICK);
+        bar.enable_steady_tick(TICK);
         Self { bar, left, share: Mutex::new(0.0) }
     }
 
