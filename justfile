@@ -155,10 +155,10 @@ features-tools:
 # queries, and a fleet in a store that speaks S3. Some twenty minutes the first time.
 fleet: deny-tool fleet-tools
     cd fleet && cargo fmt --check
-    cd fleet && cargo clippy --all-targets --features s3 -- -D warnings
-    cd fleet && cargo test --features s3
+    cd fleet && cargo clippy --all-targets --all-features -- -D warnings
+    cd fleet && cargo test --all-features
     PATH="{{ tools }}/bin:$PATH" cargo deny --manifest-path fleet/Cargo.toml --all-features --config deny.toml check licenses bans sources
-    cd fleet && cargo build --features s3 --bin tactus-fleet --example synthetic_tables
+    cd fleet && cargo build --all-features --bin tactus-fleet --example synthetic_tables
     TACTUS_FLEET_PROGRAMS=$PWD/fleet/target/debug {{ tools }}/fleet/bin/pytest -q fleet/tests/python
 
 # A virtual environment with DuckDB and polars.

@@ -1,5 +1,7 @@
 //! The commands and their arguments.
 
+#[cfg(feature = "cluster")]
+use std::net::SocketAddr;
 use std::{
     fs, io,
     num::NonZeroUsize,
@@ -17,6 +19,8 @@ use tempfile::TempDir;
 use tokio::runtime::Runtime;
 use tokio::sync::oneshot;
 
+#[cfg(feature = "cluster")]
+use crate::cluster;
 use crate::{
     IngestOptions, Place,
     exit::{Exit, in_words},
@@ -64,6 +68,12 @@ enum FleetCommand {
     Discover(SurveyArgs),
     /// Ask all frames and runs in SQL.
     Query(QueryArgs),
+    /// Share the queries of others among executors, until it is stopped.
+    #[cfg(feature = "cluster")]
+    Scheduler(SchedulerArgs),
+    /// Do a part of the queries that a scheduler has, until it is stopped.
+    #[cfg(feature = "cluster")]
+    Executor(ExecutorArgs),
 }
 
 #[derive(Debug, Args)]
@@ -112,6 +122,38 @@ struct QueryArgs {
     /// Folder for what goes to the disk. Default: that of the system for temporary files.
     #[arg(long, value_name = "DIR")]
     spill: Option<PathBuf>,
+    /// The scheduler of a cluster that does the query. All its machines must reach the fleet at the same place.
+    #[cfg(feature = "cluster")]
+    #[arg(long, value_name = "IP:PORT")]
+    cluster: Option<SocketAddr>,
+}
+
+#[cfg(feature = "cluster")]
+#[derive(Debug, Args)]
+struct SchedulerArgs {
+    /// Where it listens. Whoever reaches it can read the fleet: stay within a trusted network.
+    #[arg(long, value_name = "IP:PORT", default_value = "127.0.0.1:50050")]
+    listen: SocketAddr,
+    /// An executor that is silent for so long is given up; others do its part again. At least 10, because a busy one is heard every 5.
+    #[arg(long, value_name = "SECONDS", default_value_t = 20, value_parser = clap::value_parser!(u64).range(10..))]
+    lost_s: u64,
+}
+
+#[cfg(feature = "cluster")]
+#[derive(Debug, Args)]
+struct ExecutorArgs {
+    /// The scheduler.
+    #[arg(long, value_name = "IP:PORT", default_value = "127.0.0.1:50050")]
+    scheduler: SocketAddr,
+    /// Where it hands out parts of answers, under this address.
+    #[arg(long, value_name = "IP:PORT", default_value = "127.0.0.1:50051")]
+    listen: SocketAddr,
+    /// Memory for sorts, groups and joins, in GB. What is beyond goes to the disk.
+    #[arg(long, value_name = "GB", default_value_t = 2.0)]
+    memory: f64,
+    /// Folder for parts of answers, and for what goes to the disk. Default: that of the system for temporary files.
+    #[arg(long, value_name = "DIR")]
+    spill: Option<PathBuf>,
 }
 
 /// Runs the program with the process's arguments.
@@ -139,6 +181,10 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
         FleetCommand::Calibrate(args) => run_survey::<Calibrated>(&runtime, &cli.common, args),
         FleetCommand::Discover(args) => run_survey::<Discovered>(&runtime, &cli.common, args),
         FleetCommand::Query(args) => run_query(runtime, &cli.common, args),
+        #[cfg(feature = "cluster")]
+        FleetCommand::Scheduler(args) => run_scheduler(&runtime, args),
+        #[cfg(feature = "cluster")]
+        FleetCommand::Executor(args) => run_executor(&runtime, &cli.common, args),
     }
 }
 
@@ -217,14 +263,36 @@ fn spill_folder(within: Option<&Path>) -> anyhow::Result<TempDir> {
     }
 }
 
+#[cfg(feature = "cluster")]
+fn run_scheduler(runtime: &Runtime, args: &SchedulerArgs) -> anyhow::Result<Exit> {
+    let ready = |at| eprintln!("scheduler at {at}; Ctrl-C stops it");
+    runtime.block_on(cluster::schedule(args.listen, args.lost_s, ready))?;
+    Ok(Exit::Done)
+}
+
+#[cfg(feature = "cluster")]
+fn run_executor(runtime: &Runtime, common: &Common, args: &ExecutorArgs) -> anyhow::Result<Exit> {
+    let folder = spill_folder(args.spill.as_deref())?;
+    let options = cluster::ExecutorOptions {
+        scheduler: args.scheduler,
+        listen: args.listen,
+        threads: common.threads().get(),
+        memory_bytes: bytes(args.memory) as u64,
+        folder: folder.path().to_owned(),
+    };
+    let ready = |at| eprintln!("executor at {at} of the scheduler at {}; Ctrl-C stops it", args.scheduler);
+    runtime.block_on(cluster::execute(options, ready))?;
+    Ok(Exit::Done)
+}
+
 async fn ask(place: &Place, spill: &Path, common: &Common, args: &QueryArgs) -> anyhow::Result<Exit> {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "such a cast takes the nearest number of bytes that there is"
-    )]
-    let memory_bytes = (args.memory * 1e9) as usize;
-    let limits = Limits { threads: common.threads(), memory_bytes, spill: spill.to_owned() };
+    let limits = Limits {
+        threads: common.threads(),
+        memory_bytes: bytes(args.memory),
+        spill: spill.to_owned(),
+        #[cfg(feature = "cluster")]
+        cluster: args.cluster,
+    };
     let query = Query::new(place, &args.sql, &limits).await?;
     let mut progress = None;
     let show = |now| progress.get_or_insert_with(|| Progress::new(common.json)).show(now);
@@ -254,6 +322,15 @@ async fn ask(place: &Place, spill: &Path, common: &Common, args: &QueryArgs) -> 
         }
     }
     Ok(Exit::Done)
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "such a cast takes the nearest number of bytes that there is"
+)]
+fn bytes(gb: f64) -> usize {
+    (gb * 1e9) as usize
 }
 
 /// What `--json` prints of a query whose rows are in a file.

@@ -10,12 +10,15 @@
 //! | `columns` | the columns of a file, and rows as Arrow batches |
 //! | `run_head` | what a file says of its run, in its metadata |
 //! | `ingest` | from recordings to files |
+//! | `cluster` | a query on several machines, with the feature of that name |
 //! | `query` | SQL over all runs |
 //! | `survey` | calibration and discovery of every run, and what they say together |
 //! | `threads` | how both share their work |
 #![expect(clippy::print_stderr, reason = "errors go to standard error, results to standard output")]
 
 mod cli;
+#[cfg(feature = "cluster")]
+mod cluster;
 mod columns;
 mod exit;
 mod ingest;

@@ -37,10 +37,14 @@ use datafusion::{
 use futures::StreamExt as _;
 use tokio::time::{Instant, interval_at};
 
+#[cfg(feature = "cluster")]
+use crate::cluster;
 use crate::{Place, progress::Now};
 
 pub(crate) use answer::{Answer, Lines, OutFile, Table};
 use problem::in_words;
+#[cfg(feature = "cluster")]
+pub(crate) use {predicted::Prediction, runs::Runs, session::register_functions};
 
 /// What a query may take.
 #[derive(Debug, Clone)]
@@ -51,6 +55,9 @@ pub(crate) struct Limits {
     pub(crate) memory_bytes: usize,
     /// Folder for what goes to the disk.
     pub(crate) spill: PathBuf,
+    /// The scheduler of the cluster that does all that; `None` if this process does it.
+    #[cfg(feature = "cluster")]
+    pub(crate) cluster: Option<std::net::SocketAddr>,
 }
 
 /// A query that can be run.
@@ -68,6 +75,10 @@ impl Query {
 
     /// Checks the query, and decides how it is run. Ends of files are read, their rows are not.
     pub(crate) async fn new(place: &Place, sql: &str, limits: &Limits) -> anyhow::Result<Self> {
+        #[cfg(feature = "cluster")]
+        if let Some(scheduler) = limits.cluster {
+            cluster::check(scheduler, place).await?;
+        }
         place.check_holds_runs().await?;
         match Self::planned(place, sql, limits).await {
             Ok(query) => Ok(query),
@@ -102,7 +113,11 @@ impl Query {
                     Some(Err(error)) => return Err(in_words(error, &self.place, &self.sql).await),
                     None => return Ok(()),
                 },
-                _ = ticks.tick() => show(self.scanned()),
+                _ = ticks.tick() => match self.scanned() {
+                    // A cluster does not say how far it is.
+                    Now { files_all: 0, .. } => {}
+                    now => show(now),
+                },
             }
         }
     }

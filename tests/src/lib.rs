@@ -291,6 +291,14 @@ impl Process {
         self.child.id()
     }
 
+    /// True if it has not ended.
+    ///
+    /// # Panics
+    /// If the system does not say.
+    pub fn is_running(&mut self) -> bool {
+        self.child.try_wait().expect("a child can be asked").is_none()
+    }
+
     /// Sends a signal.
     ///
     /// # Panics

@@ -3,7 +3,6 @@
 use std::{
     fs,
     hash::{Hash, Hasher},
-    path::Path,
     sync::Arc,
 };
 
@@ -48,7 +47,7 @@ impl TableFunctionImpl for Predicted {
         let [Expr::Literal(ScalarValue::Utf8(Some(path)), _)] = args.exprs() else {
             return plan_err!("predicted() takes the path of a model: predicted('model.toml')");
         };
-        let prediction = ScalarUDF::new_from_impl(Prediction::of(Path::new(path))?);
+        let prediction = ScalarUDF::new_from_impl(Prediction::of(path)?);
         let of_frames = |column: &str| Expr::Column(Column::new(Some("frames"), column));
         let of_runs = |column: &str| Expr::Column(Column::new(Some("runs"), column));
         let frames = LogicalPlanBuilder::scan("frames", provider_as_source(Arc::clone(&self.frames)), None)?;
@@ -73,8 +72,11 @@ impl TableFunctionImpl for Predicted {
 
 /// Counts that a model gives for a rig's description, a tool, a position and a covering.
 #[derive(Debug)]
-struct Prediction {
+pub(crate) struct Prediction {
     path: String,
+    /// The model file, for those to whom the function is sent.
+    #[cfg_attr(not(feature = "cluster"), expect(dead_code, reason = "only a cluster sends functions"))]
+    text: String,
     model: ForwardModel,
     signature: Signature,
 }
@@ -95,23 +97,36 @@ impl Hash for Prediction {
 }
 
 impl Prediction {
-    fn of(path: &Path) -> Result<Self> {
-        let path_text = path.display().to_string();
-        let text = fs::read_to_string(path).map_err(|error| plan_datafusion_err!("{path_text}: {error}"))?;
-        let model = Model::from_toml(&text).map_err(|error| plan_datafusion_err!("{path_text}: {error}"))?;
+    /// Its name in plans; queries cannot call it by it.
+    pub(crate) const NAME: &'static str = "prediction";
+
+    fn of(path: &str) -> Result<Self> {
+        let text = fs::read_to_string(path).map_err(|error| plan_datafusion_err!("{path}: {error}"))?;
+        Self::new(path.to_owned(), text)
+    }
+
+    pub(crate) fn new(path: String, text: String) -> Result<Self> {
+        let model = Model::from_toml(&text).map_err(|error| plan_datafusion_err!("{path}: {error}"))?;
         if let Some(known) = model.effects.first() {
             return plan_err!(
-                "{path_text} has the effect {}: effects act in time, and predicted() sees one frame at a time. Give a model without effects",
+                "{path} has the effect {}: effects act in time, and predicted() sees one frame at a time. Give a model without effects",
                 known.effect.name()
             );
         }
         let numbers = vec![DataType::Float64; 4];
         let given = [vec![DataType::Utf8View; 2], numbers].concat();
         Ok(Self {
-            model: model.forward().map_err(|error| plan_datafusion_err!("{path_text}: {error}"))?,
-            path: path_text,
+            model: model.forward().map_err(|error| plan_datafusion_err!("{path}: {error}"))?,
+            path,
+            text,
             signature: Signature::exact(given, Volatility::Immutable),
         })
+    }
+
+    /// Path and text of the model file.
+    #[cfg(feature = "cluster")]
+    pub(crate) fn model_file(&self) -> [&str; 2] {
+        [&self.path, &self.text]
     }
 
     /// The sensor of a rig under one of its tools and a covering.
@@ -146,7 +161,7 @@ impl Prediction {
 
 impl ScalarUDFImpl for Prediction {
     fn name(&self) -> &'static str {
-        "prediction"
+        Self::NAME
     }
 
     fn signature(&self) -> &Signature {

@@ -23,13 +23,13 @@ use crate::{Place, run_head::Described};
 
 /// One row for each run. The ends of all files are read when a query wants it.
 #[derive(Debug)]
-pub(super) struct Runs {
+pub(crate) struct Runs {
     place: Place,
     schema: SchemaRef,
 }
 
 impl Runs {
-    pub(super) fn new(place: Place) -> Self {
+    pub(crate) fn new(place: Place) -> Self {
         let required = |name: &str, kind| Field::new(name, kind, false);
         let optional = |name: &str, kind| Field::new(name, kind, true);
         let schema = Schema::new(vec![
@@ -49,6 +49,11 @@ impl Runs {
             required("description", DataType::Utf8View),
         ]);
         Self { place, schema: Arc::new(schema) }
+    }
+
+    #[cfg(feature = "cluster")]
+    pub(crate) fn place(&self) -> &Place {
+        &self.place
     }
 
     fn rows(&self, runs: &[Described]) -> Result<RecordBatch> {
@@ -101,7 +106,12 @@ impl TableProvider for Runs {
     ) -> Result<Arc<dyn ExecutionPlan>> {
         let runs =
             Described::all(&self.place).await.map_err(|error| DataFusionError::External(error.into()))?;
-        let rows = self.rows(&runs)?;
-        Ok(MemorySourceConfig::try_new_exec(&[vec![rows]], self.schema(), columns.cloned())?)
+        let mut rows = self.rows(&runs)?;
+        // A cluster sends them: descriptions are long.
+        if let Some(columns) = columns {
+            rows = rows.project(columns)?;
+        }
+        let schema = rows.schema();
+        Ok(MemorySourceConfig::try_new_exec(&[vec![rows]], schema, None)?)
     }
 }

@@ -45,14 +45,12 @@ pub(super) fn read_only() -> SQLOptions {
 
 /// A session that knows the fleet.
 pub(super) async fn session(place: &Place, limits: &Limits) -> Result<SessionContext> {
-    let session = SessionContext::new_with_config_rt(config(limits), Arc::new(runtime(limits)?));
+    let session = context(limits).await?;
     let folder = folder(place)?;
     session.register_object_store(folder.object_store().as_ref(), Arc::clone(place.store()));
     let frames: Arc<dyn TableProvider> = Arc::new(frames(folder)?);
     let runs: Arc<dyn TableProvider> = Arc::new(Runs::new(place.clone()));
-    session.register_udaf(AggregateUDF::new_from_impl(Image::new()));
-    session.register_udf(ScalarUDF::new_from_impl(Response::new()));
-    session.register_udf(ScalarUDF::new_from_impl(Rms::new()));
+    register_functions(&session);
     session.register_udtf("predicted", Arc::new(Predicted::new(Arc::clone(&frames), Arc::clone(&runs))));
     session.register_table("frames", frames)?;
     session.register_table("runs", runs)?;
@@ -60,6 +58,27 @@ pub(super) async fn session(place: &Place, limits: &Limits) -> Result<SessionCon
         session.register_table(name, session.sql(sql).await?.into_view())?;
     }
     Ok(session)
+}
+
+/// The functions of Tactus.
+pub(crate) fn register_functions(session: &SessionContext) {
+    session.register_udaf(AggregateUDF::new_from_impl(Image::new()));
+    session.register_udf(ScalarUDF::new_from_impl(Response::new()));
+    session.register_udf(ScalarUDF::new_from_impl(Rms::new()));
+}
+
+#[cfg(not(feature = "cluster"))]
+async fn context(limits: &Limits) -> Result<SessionContext> {
+    Ok(SessionContext::new_with_config_rt(config(limits), Arc::new(runtime(limits)?)))
+}
+
+/// Who runs the queries: this process, or a cluster.
+#[cfg(feature = "cluster")]
+async fn context(limits: &Limits) -> Result<SessionContext> {
+    match &limits.cluster {
+        Some(scheduler) => crate::cluster::session(*scheduler, config(limits)).await,
+        None => Ok(SessionContext::new_with_config_rt(config(limits), Arc::new(runtime(limits)?))),
+    }
 }
 
 fn config(limits: &Limits) -> SessionConfig {

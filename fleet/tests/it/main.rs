@@ -1,6 +1,8 @@
 //! A fleet, through the program and the library.
 
 mod book;
+#[cfg(feature = "cluster")]
+mod cluster;
 mod ingest;
 mod lab;
 mod query;
