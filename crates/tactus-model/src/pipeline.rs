@@ -1,6 +1,6 @@
 //! The pipeline in time: from the position of the tip to the reading of every element.
 
-use std::sync::Arc;
+use std::{slice, sync::Arc};
 
 use crate::effect::{
     BaseModel, Drafted, Effect, EffectError, Load, Make, Now, OnContact, OnCovering, OnElement, OnMotion,
@@ -342,6 +342,13 @@ impl Pipeline {
     }
 }
 
+impl Effect {
+    /// True if a frame alone does not determine what it does: it depends on the time, or on the moments before.
+    pub fn acts_in_time(&self) -> bool {
+        Stages::of(slice::from_ref(self)).act_in_time()
+    }
+}
+
 impl Stages {
     fn of(effects: &[Effect]) -> Self {
         let mut stages = Self::default();
@@ -370,6 +377,16 @@ impl Stages {
         }
         stages.remember = stages.last_that_remembers();
         stages
+    }
+
+    /// True if a moment alone does not determine what they do.
+    fn act_in_time(&self) -> bool {
+        let Self { motion, contact: _, covering, element, readout, remember } = self;
+        remember.is_some()
+            || motion.iter().any(|effect| effect.is_timed())
+            || covering.iter().any(|effect| effect.is_timed())
+            || element.iter().any(|effect| effect.is_timed())
+            || readout.iter().any(|effect| effect.is_timed())
     }
 
     fn last_that_remembers(&self) -> Option<PipelineStage> {

@@ -216,6 +216,19 @@ fn nor_do_they_on_what_another_pipeline_reached() {
     }
 }
 
+#[test]
+fn what_does_not_act_in_time_does_the_same_to_a_frame_whatever_was_before() {
+    for effect in all_strong() {
+        let simulator = simulator([effect.clone()]);
+        let way = way(&simulator);
+        let mut in_time = Pipeline::new(&simulator).unwrap();
+        let differs = moments().fold(false, |differs, (moment, _)| {
+            differs | (in_time.step(moment, &way) != still(&simulator, way.at(moment.t_s)))
+        });
+        assert_eq!(differs, effect.acts_in_time(), "{}", effect.name());
+    }
+}
+
 fn find(name: &str) -> &'static Definition {
     Definition::find(name).unwrap()
 }

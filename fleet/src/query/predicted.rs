@@ -21,7 +21,7 @@ use datafusion::{
     },
     scalar::ScalarValue,
 };
-use tactus_model::{Covering, ForwardModel, Moment, Pipeline, Simulator};
+use tactus_model::{Covering, Effect, ForwardModel, Moment, Pipeline, Simulator};
 use tactus_schema::{Model, Rig};
 
 use super::{lists::list_type, response::Response};
@@ -78,6 +78,7 @@ pub(crate) struct Prediction {
     #[cfg_attr(not(feature = "cluster"), expect(dead_code, reason = "only a cluster sends functions"))]
     text: String,
     model: ForwardModel,
+    effects: Vec<Effect>,
     signature: Signature,
 }
 
@@ -107,16 +108,18 @@ impl Prediction {
 
     pub(crate) fn new(path: String, text: String) -> Result<Self> {
         let model = Model::from_toml(&text).map_err(|error| plan_datafusion_err!("{path}: {error}"))?;
-        if let Some(known) = model.effects.first() {
+        let effects: Vec<Effect> = model.effects.iter().map(|known| known.effect.clone()).collect();
+        if let Some(effect) = effects.iter().find(|effect| effect.acts_in_time()) {
             return plan_err!(
-                "{path} has the effect {}: effects act in time, and predicted() sees one frame at a time. Give a model without effects",
-                known.effect.name()
+                "{path} has the effect {}, which acts in time, and predicted() sees one frame at a time. Give a model without it",
+                effect.name()
             );
         }
         let numbers = vec![DataType::Float64; 4];
         let given = [vec![DataType::Utf8View; 2], numbers].concat();
         Ok(Self {
             model: model.forward().map_err(|error| plan_datafusion_err!("{path}: {error}"))?,
+            effects,
             path,
             text,
             signature: Signature::exact(given, Volatility::Immutable),
@@ -152,7 +155,7 @@ impl Prediction {
             surface_mm: 0.0,
             covering: Covering { thickness_mm: covering_mm },
             indenter: indenter.clone(),
-            effects: Vec::new(),
+            effects: self.effects.clone(),
             noise_rms_counts: 0.0,
         };
         Pipeline::new(&simulator).map_err(|error| exec_datafusion_err!("{}: {error}", self.path))

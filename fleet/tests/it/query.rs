@@ -181,6 +181,25 @@ fn residuals_are_the_counts_less_what_the_model_gives() {
     }
 }
 
+/// An effect in a model file: the surface stands higher by 0.1 mm.
+const OFFSET: &str = "\n[[effect]]\nname = \"surface-offset\"\nparameters = { offset_mm = 0.1 }\n";
+
+#[test]
+fn effects_that_do_not_act_in_time_are_predicted() {
+    let lab = Lab::with_three_runs();
+    lab.ingest();
+    fs::write(lab.path("effect.toml"), format!("{MODEL}{OFFSET}")).unwrap();
+    let sql = "SELECT -z_mm AS depth_mm, prediction[1] AS counts FROM predicted('effect.toml')
+               WHERE rig = 'left' AND phase IN ('hold', 'load', 'approach')";
+    let told = ask(&lab, sql);
+    assert!(!told.is_empty());
+    for told in told {
+        let depth_mm = told["depth_mm"].as_f64().unwrap() + 0.1;
+        let expected = 100.0 + 1000.0 * depth_mm.max(0.0);
+        assert!((told["counts"].as_f64().unwrap() - expected).abs() < 1e-6, "{told}");
+    }
+}
+
 #[test]
 fn models_that_do_not_fit_are_refused() {
     let lab = Lab::with_three_runs();
@@ -189,9 +208,9 @@ fn models_that_do_not_fit_are_refused() {
     assert!(refused(&lab, &of("nowhere.toml")).contains("nowhere.toml: No such file"));
     fs::write(lab.path("wrong.toml"), "schema = 1").unwrap();
     assert!(refused(&lab, &of("wrong.toml")).contains("wrong.toml: "));
-    let effect = "\n[[effect]]\nname = \"surface-offset\"\nparameters = { offset_mm = 0.1 }\n";
-    fs::write(lab.path("effect.toml"), format!("{MODEL}{effect}")).unwrap();
-    assert!(refused(&lab, &of("effect.toml")).contains("has the effect surface-offset"));
+    let effect = "\n[[effect]]\nname = \"time-lag\"\nparameters = { lag_s = 0.01 }\n";
+    fs::write(lab.path("effect.toml"), format!("{MODEL}{OFFSET}{effect}")).unwrap();
+    assert!(refused(&lab, &of("effect.toml")).contains("has the effect time-lag, which acts in time"));
     let small = MODEL
         .replace("rows = 6", "rows = 1")
         .replace("row_centres_mm = [0.9, 2.9, 4.9, 6.9, 8.9, 10.9]", "row_centres_mm = [0.9]");

@@ -95,6 +95,10 @@ impl OnReadout for BaselineDrift {
             *count += drift_counts;
         }
     }
+
+    fn is_timed(&self) -> bool {
+        true
+    }
 }
 
 #[expect(

@@ -71,6 +71,10 @@ impl OnReadout for PeriodicInterference {
             *count += tone;
         }
     }
+
+    fn is_timed(&self) -> bool {
+        true
+    }
 }
 
 impl PeriodicInterference {

@@ -66,6 +66,11 @@ pub trait OnMotion: Debug + Send + Sync {
     /// Changes the position of the tip, the registration or the surface.
     fn place(&mut self, _now: Now<'_>, _tip: &mut TipState) {}
 
+    /// True if what it does depends on the time.
+    fn is_timed(&self) -> bool {
+        false
+    }
+
     /// True if what it does depends on the moments before.
     fn remembers(&self) -> bool {
         false
@@ -102,6 +107,11 @@ pub trait OnCovering: Debug + Send + Sync {
     /// Changes the signal that reaches the elements: equivalent indentations in mm, row-major.
     fn signal(&mut self, _now: Now<'_>, _contact: &Contact, _signal_mm: &mut [f64]) {}
 
+    /// True if what it does depends on the time.
+    fn is_timed(&self) -> bool {
+        false
+    }
+
     /// True if what it does depends on the moments before.
     fn remembers(&self) -> bool {
         false
@@ -120,6 +130,11 @@ pub trait OnElement: Debug + Send + Sync {
     /// Changes counts after the response.
     fn counts(&self, _base: BaseModel<'_>, _counts: &mut [f64]) {}
 
+    /// True if what it does depends on the time.
+    fn is_timed(&self) -> bool {
+        false
+    }
+
     /// True if what it does depends on the moments before.
     fn remembers(&self) -> bool {
         false
@@ -137,6 +152,11 @@ pub trait OnReadout: Debug + Send + Sync {
     /// Changes a noisy reading before the converter.
     fn convert(&self, counts: f64) -> f64 {
         counts
+    }
+
+    /// True if what it does depends on the time.
+    fn is_timed(&self) -> bool {
+        false
     }
 
     /// True if what it does depends on the moments before.

@@ -38,6 +38,10 @@ impl OnMotion for TimeLag {
     fn instant_s(&self, t_s: f64) -> f64 {
         t_s - self.lag_s
     }
+
+    fn is_timed(&self) -> bool {
+        true
+    }
 }
 
 #[cfg(test)]
