@@ -33,10 +33,7 @@ use datafusion_proto::protobuf::{LogicalPlanNode, PhysicalPlanNode};
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     net::{TcpListener, TcpStream},
-    signal::{
-        ctrl_c,
-        unix::{SignalKind, signal},
-    },
+    signal::unix::{SignalKind, signal},
     time::{sleep, timeout},
 };
 use url::Url;
@@ -106,6 +103,7 @@ pub(crate) async fn schedule(
     lost_s: u64,
     ready: impl FnOnce(SocketAddr),
 ) -> anyhow::Result<()> {
+    let stopped = hear_stop()?;
     let listener = bind(listen).await?;
     let listen = listener.local_addr()?;
     let config = SchedulerConfig {
@@ -130,7 +128,7 @@ pub(crate) async fn schedule(
     ready(listen);
     tokio::select! {
         served = start_grpc_service_with_listener(listener, scheduler) => Ok(served?),
-        stopped = stopped() => Ok(stopped?),
+        () = stopped => Ok(()),
     }
 }
 
@@ -151,8 +149,9 @@ pub(crate) struct ExecutorOptions {
 
 /// Runs an executor until it is stopped. `ready` is told where it listens.
 pub(crate) async fn execute(options: ExecutorOptions, ready: impl FnOnce(SocketAddr)) -> anyhow::Result<()> {
-    /// So long it may take to tell the scheduler that it ends. What it computes by then, others do again.
+    /// So long it may take to tell the scheduler that it ends. What it computes meanwhile, others do again.
     const FAREWELL: Duration = Duration::from_secs(2);
+    let stopped = hear_stop()?;
     check_listens(options.scheduler).await?;
     // Ballista binds by itself, and would end without a word if it could not.
     let listen = bind(options.listen).await?.local_addr()?;
@@ -167,7 +166,8 @@ pub(crate) async fn execute(options: ExecutorOptions, ready: impl FnOnce(SocketA
         vcores: options.threads,
         task_scheduling_policy: TaskSchedulingPolicy::PullStaged,
         work_dir: Some(text(&options.folder)?),
-        memory_pool_size: Some(options.memory_bytes),
+        // To Ballista, 0 is no limit.
+        memory_pool_size: Some(options.memory_bytes.max(1)),
         override_config_producer: Some(Arc::new(config)),
         override_function_registry: Some(Arc::new(BallistaFunctionRegistry::from(&session.state()))),
         override_logical_codec: Some(Arc::new(Codec::default())),
@@ -175,15 +175,14 @@ pub(crate) async fn execute(options: ExecutorOptions, ready: impl FnOnce(SocketA
         ..ExecutorProcessConfig::default()
     };
     ready(listen);
-    let told_to_stop = async {
-        stopped().await?;
+    let gone = async {
+        stopped.await;
         sleep(FAREWELL).await;
-        Ok(())
     };
     tokio::select! {
         // Ballista hears signals, too, and tells the scheduler. But then it goes on with tasks, and takes new ones.
         ended = start_executor_process(Arc::new(config)) => Ok(ended?),
-        stopped = told_to_stop => stopped,
+        () = gone => Ok(()),
     }
 }
 
@@ -191,13 +190,16 @@ async fn bind(listen: SocketAddr) -> anyhow::Result<TcpListener> {
     TcpListener::bind(listen).await.with_context(|| format!("{listen} cannot be listened on"))
 }
 
-/// Waits for Ctrl-C or SIGTERM.
-async fn stopped() -> io::Result<()> {
+/// Hears Ctrl-C and SIGTERM from now on; ends with the first.
+fn hear_stop() -> io::Result<impl Future<Output = ()>> {
+    let mut interrupted = signal(SignalKind::interrupt())?;
     let mut terminated = signal(SignalKind::terminate())?;
-    tokio::select! {
-        interrupted = ctrl_c() => interrupted,
-        _ = terminated.recv() => Ok(()),
-    }
+    Ok(async move {
+        tokio::select! {
+            _ = interrupted.recv() => (),
+            _ = terminated.recv() => (),
+        }
+    })
 }
 
 /// An address as it stands before `:PORT`.
