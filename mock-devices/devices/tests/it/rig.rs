@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tactus_device::{
-    ArrayExpectation, Clock, DrivenStage, Sensor, SensorCodec, SensorDriver, SensorEvent, Stage, StageError,
+    ArrayExpectation, Clock, DrivenStage, SensorCodec, SensorDriver, SensorEvent, Stage, StageError,
     StageOptions, Target,
 };
 use tactus_model::{Contact, ForwardModel, Response};

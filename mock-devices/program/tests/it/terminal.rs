@@ -12,8 +12,8 @@ use rustix::process::{Pid, Signal, kill_process};
 use tactus_device::transport::Connect;
 use tactus_device::transport::serial::SerialConnector;
 use tactus_device::{
-    ArrayExpectation, Clock, DrivenStage, HomingPermit, Permit, Sensor, SensorCodec, SensorDriver,
-    SensorEvent, Stage, StageOptions, Target,
+    ArrayExpectation, Clock, DrivenStage, HomingPermit, Permit, SensorCodec, SensorDriver, SensorEvent,
+    Stage, StageOptions, Target,
 };
 use tactus_safety::Supervisor;
 use tactus_schema::rig::{GrblAxes, StageProtocol};
