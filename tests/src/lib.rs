@@ -49,6 +49,17 @@ pub fn until<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
     }
 }
 
+/// Takes what comes until its sender has ended; false if that takes until the deadline.
+fn until_ended<T>(from: &Receiver<T>, mut take: impl FnMut(T)) -> bool {
+    let deadline = Instant::now() + DEADLINE;
+    loop {
+        match from.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            Ok(one) => take(one),
+            Err(end) => return end == RecvTimeoutError::Disconnected,
+        }
+    }
+}
+
 /// Path of one of our binaries.
 ///
 /// # Panics
@@ -323,17 +334,9 @@ impl Process {
     /// # Panics
     /// If it hangs.
     pub fn wait(mut self) -> (Option<i32>, String) {
-        let deadline = Instant::now() + DEADLINE;
         // Both streams end with the process.
-        loop {
-            match self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-                Ok(line) => self.seen.push(line),
-                Err(RecvTimeoutError::Disconnected) => break,
-                Err(RecvTimeoutError::Timeout) => {
-                    panic!("{} does not end; it printed:\n{}", self.name, self.seen.join("\n"))
-                }
-            }
-        }
+        let has_ended = until_ended(&self.lines, |line| self.seen.push(line));
+        assert!(has_ended, "{} does not end; it printed:\n{}", self.name, self.seen.join("\n"));
         let status = self.child.wait().expect("a child can be waited for");
         (status.code(), self.seen.join("\n"))
     }

@@ -6,7 +6,7 @@ use std::num::NonZeroU16;
 use std::os::fd::OwnedFd;
 use std::path::Path;
 use std::process::{Child, Command};
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::Instant;
 
@@ -14,7 +14,7 @@ use rustix::fs::{Mode, OFlags, open};
 use rustix::pty::{OpenptFlags, openpt, ptsname, unlockpt};
 use rustix::termios::{Winsize, tcsetwinsize};
 
-use crate::{DEADLINE, binary};
+use crate::{DEADLINE, binary, until_ended};
 
 /// One of our binaries at a terminal of its own, killed with the test.
 #[expect(missing_debug_implementations, reason = "a screen has none")]
@@ -119,15 +119,9 @@ impl Terminal {
     /// # Panics
     /// If it hangs.
     pub fn wait(&mut self) -> Option<i32> {
-        let deadline = Instant::now() + DEADLINE;
         // Its output ends with it.
-        loop {
-            match self.output.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-                Ok(bytes) => self.screen.process(&bytes),
-                Err(RecvTimeoutError::Disconnected) => break,
-                Err(RecvTimeoutError::Timeout) => panic!("it does not end; its screen:\n{}", self.text()),
-            }
-        }
+        let has_ended = until_ended(&self.output, |bytes| self.screen.process(&bytes));
+        assert!(has_ended, "it does not end; its screen:\n{}", self.text());
         self.child.wait().expect("a child can be waited for").code()
     }
 }
