@@ -26,14 +26,14 @@ def tactus(*args, check=True, cwd=None):
 
 
 class Lab:
-    """Virtual devices on pseudo-terminals, and a service that owns them."""
+    """Virtual devices on pseudo-terminals, and a service that owns them. In contact a sensor may be silent for three frames."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, rate_hz=30.0):
         self.folder = folder
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-        rig = (REPOSITORY / "config/rigs/pty.toml").read_text()
+        rig = (REPOSITORY / "config/rigs/pty.toml").read_text().replace("rate_hz = 30.0", f"rate_hz = {rate_hz}")
         (folder / "rig.toml").write_text(rig)
         (folder / "tactusd.toml").write_text(
             f'rig = "rig.toml"\nrecordings = "runs"\n[bus]\nlisten = ["{self.endpoint}"]\n'
