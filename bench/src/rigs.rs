@@ -4,7 +4,9 @@
 //! The devices are virtual ones of this process, each behind a socket of its own on loopback, so that the service under test is
 //! the real program with its real drivers. Each rig has its sensor and its stage.
 
-use std::collections::BTreeMap;
+mod devices;
+
+use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command as Program, Stdio};
@@ -15,17 +17,16 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use prost::Message as _;
 use tactus_bus::{Client, Endpoint, Hold};
-use tactus_device::transport::Connect;
 use tactus_record::{Entry, Message};
 use tactus_runner::config::RigFiles;
 use tactus_runner::embedded::{Truth, simulated_rig};
 use tactus_schema::key::Command;
 use tactus_schema::pb;
-use tactus_virtual::VirtualRig;
-use tokio::io::copy_bidirectional;
-use tokio::net::TcpListener;
-use tokio::time::{sleep, timeout};
+use tactus_virtual::start_devices;
+use tokio::time::{Instant as TokioInstant, sleep, timeout};
 use zenoh::Session;
+
+use devices::Devices;
 
 /// Rate of every sensor.
 const RATE_HZ: f64 = 30.0;
@@ -78,6 +79,13 @@ struct Seen {
     count: u64,
 }
 
+/// What the subscriber reads of a [`pb::Frame`].
+#[derive(Clone, PartialEq, prost::Message)]
+struct Numbered {
+    #[prost(uint64, tag = "1")]
+    seq: u64,
+}
+
 /// The service under test; it ends with this.
 struct Service {
     child: Child,
@@ -103,19 +111,16 @@ impl RigsTrial {
         let names: Vec<_> = (0..self.rigs).map(|number| format!("r{number:05}")).collect();
         let RigFiles { rig, codec, texts, .. } = simulated_rig()?;
         fs::create_dir(folder.path().join("rigs"))?;
-        for (number, name) in (0_u64..).zip(&names) {
-            let mut devices = VirtualRig::of(Truth::of_rig(&rig, number), rig.covering, &codec);
-            let sensor = serve(devices.sensor_connector()).await?;
-            let stage = serve(devices.stage_connector()).await?;
-            // They live as long as this process.
-            std::mem::forget(devices);
+        let truth = |number| Truth::of_rig(&rig, number);
+        let stage = |number| start_devices(truth(number), rig.covering, &codec, TokioInstant::now()).stage;
+        let devices = Devices::start((0..self.rigs as u64).map(stage).collect())?;
+        for (name, [sensor, stage]) in names.iter().zip(&devices.addresses) {
             let text = texts.rig_toml.replace("name = \"sim\"", &format!("name = \"{name}\""));
-            let text = at(&at(&text, &sensor), &stage);
+            let text = at(&at(&text, sensor), stage);
             fs::write(folder.path().join("rigs").join(format!("{name}.toml")), text)?;
         }
         let mut service = self.start(folder)?;
-        let session = session(&service.endpoint).await?;
-        all_ready(&session, &names, &mut service).await?;
+        all_ready(&names, &mut service).await?;
         if self.is_recording {
             for name in &names {
                 start_run(&service.endpoint, name, &self.script())
@@ -124,7 +129,8 @@ impl RigsTrial {
             }
         }
         let (seen, is_counting) =
-            (Arc::<Mutex<BTreeMap<String, Seen>>>::default(), Arc::new(AtomicBool::new(false)));
+            (Arc::<Mutex<HashMap<String, Seen>>>::default(), Arc::new(AtomicBool::new(false)));
+        let session = session(&service.endpoint).await?;
         let _subscriber = session
             .declare_subscriber("tactus/*/sensor/frame$*")
             .callback({
@@ -226,20 +232,6 @@ impl Drop for Service {
     }
 }
 
-/// Serves a virtual device at a port of its own; returns its address.
-async fn serve(device: Box<dyn Connect>) -> Result<String> {
-    let listener = TcpListener::bind("127.0.0.1:0").await?;
-    let address = listener.local_addr()?.to_string();
-    tokio::spawn(async move {
-        while let Ok((mut host, _)) = listener.accept().await {
-            let Ok(mut line) = device.connect().await else { return };
-            // Either side may hang up.
-            drop(copy_bidirectional(&mut host, &mut line).await);
-        }
-    });
-    Ok(address)
-}
-
 /// The rig file with its first embedded device at an address.
 fn at(rig: &str, address: &str) -> String {
     rig.replacen("{ kind = \"embedded\" }", &format!("{{ kind = \"tcp\", address = \"{address}\" }}"), 1)
@@ -261,8 +253,10 @@ async fn session(endpoint: &Endpoint) -> Result<Session> {
     zenoh::open(config).await.map_err(|error| anyhow::anyhow!("no service at {endpoint}: {error}"))
 }
 
-/// Waits until every rig has said that its frames flow.
-async fn all_ready(session: &Session, names: &[String], service: &mut Service) -> Result<()> {
+/// Waits until every rig has said that its frames flow. The session is one of its own: a session that knows all rigs' tokens
+/// compares each frame's key with every one of them.
+async fn all_ready(names: &[String], service: &mut Service) -> Result<()> {
+    let session = session(&service.endpoint).await?;
     let tokens = session.liveliness().declare_subscriber("tactus/*/alive").history(true).await;
     let tokens = tokens.map_err(|error| anyhow::anyhow!("{error}"))?;
     let mut ready = std::collections::BTreeSet::new();
@@ -278,7 +272,7 @@ async fn all_ready(session: &Session, names: &[String], service: &mut Service) -
         ready.insert(token.map_err(|error| anyhow::anyhow!("{error}"))?.key_expr().to_string());
         ensure!(service.child.try_wait()?.is_none(), "the service has ended");
     }
-    Ok(())
+    session.close().await.map_err(|error| anyhow::anyhow!("{error}"))
 }
 
 /// Resets a rig and starts a run on it.
@@ -307,16 +301,21 @@ async fn start_run(endpoint: &Endpoint, rig: &str, script: &str) -> Result<()> {
 }
 
 /// Counts a frame that reached the subscriber.
-fn count(seen: &Mutex<BTreeMap<String, Seen>>, key: &str, payload: &[u8]) {
-    let (Some(rig), Ok(frame)) = (key.split('/').nth(1), pb::Frame::decode(payload)) else { return };
+fn count(seen: &Mutex<HashMap<String, Seen>>, key: &str, payload: &[u8]) {
+    let (Some(rig), Ok(Numbered { seq })) = (key.split('/').nth(1), Numbered::decode(payload)) else {
+        return;
+    };
     let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
-    let of = seen.entry(rig.to_owned()).or_insert(Seen { first: frame.seq, last: frame.seq, count: 0 });
-    of.last = frame.seq;
-    of.count += 1;
+    if let Some(of) = seen.get_mut(rig) {
+        of.last = seq;
+        of.count += 1;
+    } else {
+        seen.insert(rig.to_owned(), Seen { first: seq, last: seq, count: 1 });
+    }
 }
 
 /// Frames that the subscriber could have seen and that are in no recording.
-fn unrecorded(folder: &Path, seen: &BTreeMap<String, Seen>) -> Result<u64> {
+fn unrecorded(folder: &Path, seen: &HashMap<String, Seen>) -> Result<u64> {
     let mut missing = 0;
     for (rig, of) in seen {
         let mut runs = fs::read_dir(folder.join("runs").join(rig))?;
