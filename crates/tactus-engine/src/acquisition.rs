@@ -12,7 +12,7 @@ use tactus_safety::{Fault, Supervisor, Violation};
 use tactus_schema::rig::OnGap;
 use tactus_schema::{Frame, MonoTime, pb};
 use tokio::sync::{mpsc, oneshot};
-use tokio::time::{MissedTickBehavior, timeout};
+use tokio::time::{sleep_until, timeout};
 use tracing::{error, info, warn};
 
 use crate::average::{Average, Window};
@@ -22,13 +22,19 @@ use crate::outlet::{Record, RecordFailure};
 use crate::run::Ending;
 
 /// Longest time between two looks at the clock. The stage's driver stops a stage that is unwatched for 80 ms.
-const TICK_MAX: Duration = Duration::from_millis(33);
+const LOOK_MAX: Duration = Duration::from_millis(35);
 
-/// Shortest time between two looks, however fast the sensor is.
-const TICK_MIN: Duration = Duration::from_millis(10);
+/// The same for fast sensors, whose frames are closer together than this.
+const LOOK_MIN: Duration = Duration::from_millis(10);
 
-/// Supervisor ticks between two publications of the run's state.
-const TICKS_PER_STATE: u64 = 15;
+/// Without a frame, the look comes this late in sample periods: frames in time leave none to the timer.
+const LOOK_PERIODS: f64 = 1.05;
+
+/// What is done at each look, in words.
+const CLOCK_CHECKED: &str = "the clock was checked";
+
+/// Time between two publications of the run's state.
+const STATE_PERIOD: Duration = Duration::from_millis(500);
 
 /// Longest time until a question is answered: whoever asks must not hang with the task.
 const ANSWER_MAX: Duration = Duration::from_secs(2);
@@ -46,6 +52,11 @@ pub(crate) struct Acquisition {
     sensor_info: Option<pb::SensorInfo>,
     safety_seq: u64,
     clock: ClockWatch,
+    /// Longest time between two looks at the clock.
+    look_period: Duration,
+    /// When the clock was last looked at, and when the run's state was last published.
+    looked: MonoTime,
+    stated: MonoTime,
 }
 
 /// What the run in progress has received and lost.
@@ -125,25 +136,32 @@ pub(crate) async fn acquire(
     mut sensor: Box<dyn Sensor>,
     mut reports: mpsc::Receiver<pb::StageState>,
 ) {
-    let mut tick = tokio::time::interval(shared.sample_period().clamp(TICK_MIN, TICK_MAX));
-    tick.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let mut ticks = 0_u64;
+    let clock = shared.clock;
     let mut acquisition = Acquisition::new(shared, supervisor);
     let mut has_sensor = true;
+    let timer = sleep_until(clock.instant(acquisition.looked));
+    tokio::pin!(timer);
+    let mut handled = acquisition.attempt(CLOCK_CHECKED, Acquisition::on_time);
     loop {
+        if let Err(when) = handled {
+            acquisition.defect(when);
+        }
+        acquisition.publish_fault();
+        let next_look = clock.instant(acquisition.looked.after(acquisition.look_period));
+        if timer.deadline() != next_look {
+            timer.as_mut().reset(next_look);
+        }
         // A panic of the driver's, or of what handles its frames, must neither end the supervision nor go unnoticed.
         let next = AssertUnwindSafe(poll_fn(|context| sensor.poll_next(context))).catch_unwind();
-        let handled = tokio::select! {
+        handled = tokio::select! {
             biased;
             event = next, if has_sensor => {
                 if let Ok(event) = event {
                     acquisition.attempt("a frame was handled", |this| this.on_sensor(event))
                 } else {
                     has_sensor = false;
-                    acquisition.shared.pulse.send_modify(|pulse| {
-                        pulse.sensor_connected = false;
-                        pulse.sensor_broke_off = true;
-                    });
+                    acquisition.shared.pulse.send_modify(|pulse| pulse.sensor_connected = false);
+                    acquisition.shared.sensor_broke_off.send_replace(true);
                     Err("the sensor was read")
                 }
             }
@@ -153,27 +171,19 @@ pub(crate) async fn acquire(
             Some(question) = questions.0.recv() => {
                 acquisition.attempt("the run was answered", |this| question(this))
             }
-            _ = tick.tick() => {
-                ticks += 1;
-                acquisition.attempt("the clock was checked", |this| {
-                    this.on_time();
-                    if ticks.is_multiple_of(TICKS_PER_STATE) {
-                        this.refresh_state();
-                    }
-                })
-            }
+            () = &mut timer => acquisition.attempt(CLOCK_CHECKED, Acquisition::on_time),
         };
-        if let Err(when) = handled {
-            acquisition.defect(when);
-        }
-        acquisition.publish_fault();
     }
 }
 
 impl Acquisition {
     fn new(shared: Arc<Shared>, supervisor: Supervisor) -> Self {
+        let now = shared.clock.now().mono;
         Self {
             supervisor,
+            look_period: shared.sample_period().mul_f64(LOOK_PERIODS).clamp(LOOK_MIN, LOOK_MAX),
+            looked: now,
+            stated: now,
             tally: Tally::default(),
             shared,
             window: None,
@@ -248,6 +258,10 @@ impl Acquisition {
         });
         self.tell_violation(violation);
         self.shared.publish.frame(frame);
+        // The task is awake: it need not wake for the clock.
+        if frame.received.mono.since(self.looked) >= self.look_period / 2 {
+            self.on_time();
+        }
     }
 
     fn on_gap(&mut self, gap: pb::Gap) {
@@ -289,6 +303,7 @@ impl Acquisition {
 
     fn on_time(&mut self) {
         let now = self.shared.clock.now().mono;
+        self.looked = now;
         let violation = self.supervisor.on_time(now);
         self.stop_for(violation.as_ref());
         self.shared.stage.watch();
@@ -302,6 +317,10 @@ impl Acquisition {
             self.emit(pb::run_event::Event::Log(pb::Log { message: alarm }));
         }
         self.tell_violation(violation);
+        if now.since(self.stated) >= STATE_PERIOD {
+            self.stated = now;
+            self.refresh_state();
+        }
     }
 
     /// Stops motion and ends the run because a rule was broken, before anything else is done.

@@ -91,8 +91,6 @@ pub struct Pulse {
     pub frames_lost: u64,
     /// True while the sensor answers.
     pub sensor_connected: bool,
-    /// The sensor's driver broke off by a defect: only another engine reads the sensor again.
-    pub sensor_broke_off: bool,
     /// Arrival time of the last frame.
     pub last_frame: MonoTime,
     /// Time of the supervisor's last check of the clock.
@@ -165,6 +163,8 @@ pub(crate) struct Shared {
     pub(crate) control: watch::Sender<Control>,
     pub(crate) state: watch::Sender<pb::RunState>,
     pub(crate) pulse: watch::Sender<Pulse>,
+    /// The sensor's driver broke off by a defect.
+    pub(crate) sensor_broke_off: watch::Sender<bool>,
     /// The supervisor's fault, kept up to date by the acquisition task.
     pub(crate) fault: watch::Sender<Option<Fault>>,
     /// What the supervisor did last, kept by the acquisition task.
@@ -259,6 +259,7 @@ impl Engine {
             control: watch::Sender::default(),
             state: watch::Sender::new(idle),
             pulse: watch::Sender::default(),
+            sensor_broke_off: watch::Sender::default(),
             fault: watch::Sender::new(supervisor.fault()),
             safety: watch::Sender::default(),
             covering: watch::Sender::new(covering),
@@ -476,7 +477,14 @@ impl Engine {
         pb::RunState { fault: self.shared.fault_text(), ..state }
     }
 
-    /// Health of the acquisition, updated with each frame.
+    /// Returns once the sensor's driver has broken off by a defect: only another engine reads the sensor again.
+    pub async fn broken_off(&self) {
+        let mut broke_off = self.shared.sensor_broke_off.subscribe();
+        // Waiting cannot fail because the sender lives as long as this engine.
+        let _broken_off = broke_off.wait_for(|broke_off| *broke_off).await;
+    }
+
+    /// Health of the acquisition, updated with each frame: who waits for a change is woken as often.
     pub fn pulse(&self) -> watch::Receiver<Pulse> {
         self.shared.pulse.subscribe()
     }

@@ -300,9 +300,7 @@ async fn frames_flow(engine: &Engine) {
 
 /// Returns once nobody reads the sensor any more, and no run needs the stage.
 async fn broken_off(engine: &Engine) {
-    let mut pulse = engine.pulse();
-    // Without a sender the acquisition is gone, too.
-    let _gone = pulse.wait_for(|pulse| pulse.sensor_broke_off).await.is_err();
+    engine.broken_off().await;
     engine.released().await;
 }
 
