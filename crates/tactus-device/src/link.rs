@@ -1,10 +1,11 @@
 //! An open link to a device: a driver reads, writes and waits for deadlines on it.
 
+use std::pin::Pin;
 use std::time::Duration;
 
 use tactus_schema::{MonoTime, TimeStamp};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::time::{sleep_until, timeout};
+use tokio::time::{Instant, Sleep, sleep_until, timeout};
 
 use crate::transport::ByteStream;
 use crate::{Clock, DeviceError, ErrorKind};
@@ -19,6 +20,8 @@ const BUFFER_BYTES: usize = 4096;
 pub(crate) struct Link {
     stream: Box<dyn ByteStream>,
     buffer: Box<[u8]>,
+    /// One for all deadlines: to move it to a later one costs almost nothing, and every frame does.
+    timer: Pin<Box<Sleep>>,
     clock: Clock,
     device: String,
 }
@@ -33,7 +36,8 @@ pub(crate) enum LinkEvent<'a> {
 
 impl Link {
     pub(crate) fn new(stream: Box<dyn ByteStream>, clock: Clock, device: String) -> Self {
-        Self { stream, buffer: vec![0; BUFFER_BYTES].into(), clock, device }
+        let timer = Box::pin(sleep_until(Instant::now()));
+        Self { stream, buffer: vec![0; BUFFER_BYTES].into(), timer, clock, device }
     }
 
     /// The same link, with room for at least `bytes` in one read: for packets, which come in one piece.
@@ -46,10 +50,16 @@ impl Link {
         &mut self,
         deadline: Option<Duration>,
     ) -> Result<(TimeStamp, LinkEvent<'_>), DeviceError> {
+        if let Some(deadline) = deadline {
+            let deadline = self.clock.instant(MonoTime::default().after(deadline));
+            if self.timer.deadline() != deadline {
+                self.timer.as_mut().reset(deadline);
+            }
+        }
         let read = tokio::select! {
             // The deadline comes first: a device that sends without pause must not delay it.
             biased;
-            () = until(&self.clock, deadline) => None,
+            () = self.timer.as_mut(), if deadline.is_some() => None,
             read = self.stream.read(&mut self.buffer) => Some(read),
         };
         let now = self.clock.now();
@@ -73,11 +83,4 @@ impl Link {
 /// The time of a session: since the start of the clock.
 pub(crate) fn since_start(stamp: TimeStamp) -> Duration {
     stamp.mono.since(MonoTime::default())
-}
-
-async fn until(clock: &Clock, deadline: Option<Duration>) {
-    match deadline {
-        Some(deadline) => sleep_until(clock.instant(MonoTime::default().after(deadline))).await,
-        None => std::future::pending().await,
-    }
 }

@@ -168,6 +168,9 @@ where
         };
         let mut now = self.clock.now();
         let mut actions = session.start(since_start(now));
+        // One for all signs of life: to move it to a later time costs almost nothing.
+        let quiet = sleep(SIGN_OF_LIFE_IDLE);
+        tokio::pin!(quiet);
         loop {
             match self.carry_out(now, actions, link, backoff).await {
                 Ok(()) => {}
@@ -188,6 +191,7 @@ where
             let is_watched = motion.is_some_and(|motion| !motion.is_abandoned);
             let is_guarded = motion.is_some() && self.guard.is_guarding();
             let sign_of_life = if is_guarded { SIGN_OF_LIFE } else { SIGN_OF_LIFE_IDLE };
+            quiet.as_mut().reset(Instant::now() + sign_of_life);
             actions = tokio::select! {
                 biased;
                 () = self.stop.pressed() => {
@@ -219,7 +223,7 @@ where
                     }
                     Err(error) => return Ok(error),
                 },
-                () = sleep(sign_of_life) => Vec::new(),
+                () = &mut quiet => Vec::new(),
             };
             if self.guard.has_fired() {
                 now = self.abandon();
