@@ -1,7 +1,7 @@
 //! The guard: it stops the stage if its driver hangs or dies while a command is under way.
 //!
 //! The driver gives signs of life. A thread of its own, which shares nothing with the driver's runtime, watches for them,
-//! and writes the stop to the device itself when they cease.
+//! and writes the stop to the device itself when they cease. It begins with a command, and lives on for a while after the last.
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
@@ -19,6 +19,9 @@ const HANG_MAX: Duration = Duration::from_millis(80);
 /// Time between two looks.
 const LOOK: Duration = Duration::from_millis(10);
 
+/// The thread ends if no command has begun for this long: of many rigs, few move.
+const REST: Duration = Duration::from_secs(10);
+
 /// How often a driver with a command under way gives a sign of life.
 pub(super) const SIGN_OF_LIFE: Duration = Duration::from_millis(20);
 
@@ -26,7 +29,6 @@ pub(super) const SIGN_OF_LIFE: Duration = Duration::from_millis(20);
 #[derive(Debug)]
 pub(super) struct Guard {
     shared: Arc<Shared>,
-    has_thread: bool,
 }
 
 /// When the driver last gave a sign of life.
@@ -36,6 +38,8 @@ pub(super) struct Heartbeat(Arc<AtomicI64>);
 #[derive(Debug)]
 struct Shared {
     clock: Clock,
+    /// See [`REST`].
+    rest: Duration,
     heartbeat: Heartbeat,
     watch: Mutex<Watch>,
     changed: Condvar,
@@ -50,6 +54,8 @@ struct Watch {
     writer: Option<Box<dyn Write + Send>>,
     /// Bytes that stop the command under way; `None` without one.
     halt: Option<Vec<u8>>,
+    /// Somebody looks, or will look.
+    has_thread: bool,
     /// The driver is gone: the thread ends.
     is_over: bool,
 }
@@ -62,14 +68,19 @@ impl std::fmt::Debug for Watch {
 
 impl Guard {
     pub(super) fn new(clock: Clock) -> Self {
+        Self::resting_after(clock, REST)
+    }
+
+    fn resting_after(clock: Clock, rest: Duration) -> Self {
         let shared = Shared {
             clock,
+            rest,
             heartbeat: Heartbeat(Arc::default()),
             watch: Mutex::default(),
             changed: Condvar::new(),
             has_fired: AtomicBool::new(false),
         };
-        Self { shared: Arc::new(shared), has_thread: false }
+        Self { shared: Arc::new(shared) }
     }
 
     pub(super) fn heartbeat(&self) -> Heartbeat {
@@ -78,21 +89,24 @@ impl Guard {
 
     /// A device was opened. `writer` is a second way to it, if it has one.
     pub(super) fn open(&mut self, writer: Option<Box<dyn Write + Send>>) {
-        if writer.is_some() && !self.has_thread {
-            let (shared, span) = (Arc::clone(&self.shared), tracing::Span::current());
-            let guard = move || span.in_scope(|| shared.guard());
-            match thread::Builder::new().name("stage-guard".into()).spawn(guard) {
-                Ok(_) => self.has_thread = true,
-                Err(error) => tracing::error!(%error, "no thread to guard the stage's driver"),
-            }
-        }
-        *self.shared.watch() = Watch { writer, ..Watch::default() };
+        let mut watch = self.shared.watch();
+        (watch.writer, watch.halt) = (writer, None);
     }
 
     /// A command begins, which `halt` stops.
     pub(super) fn begin(&self, halt: Vec<u8>) {
         self.sign_of_life();
-        self.shared.watch().halt = Some(halt);
+        let mut watch = self.shared.watch();
+        watch.halt = Some(halt);
+        if watch.writer.is_some() && !watch.has_thread {
+            let (shared, span) = (Arc::clone(&self.shared), tracing::Span::current());
+            let guard = move || span.in_scope(|| shared.guard());
+            match thread::Builder::new().name("stage-guard".into()).spawn(guard) {
+                Ok(_) => watch.has_thread = true,
+                Err(error) => tracing::error!(%error, "no thread to guard the stage's driver"),
+            }
+        }
+        drop(watch);
         self.shared.changed.notify_one();
     }
 
@@ -103,7 +117,7 @@ impl Guard {
 
     /// True if there is somebody to notice that the driver hangs.
     pub(super) fn is_guarding(&self) -> bool {
-        self.has_thread
+        self.shared.watch().has_thread
     }
 
     /// The bytes that stop the command under way.
@@ -150,7 +164,12 @@ impl Shared {
         let mut watch = self.watch();
         while !watch.is_over {
             if watch.halt.is_none() {
-                watch = self.changed.wait(watch).unwrap_or_else(PoisonError::into_inner);
+                let (rested, waited) =
+                    self.changed.wait_timeout(watch, self.rest).unwrap_or_else(PoisonError::into_inner);
+                watch = rested;
+                if waited.timed_out() && watch.halt.is_none() {
+                    break;
+                }
                 continue;
             }
             let silent = self.clock.now().mono.since(self.heartbeat.last());
@@ -160,6 +179,8 @@ impl Shared {
             let waited = self.changed.wait_timeout(watch, LOOK).unwrap_or_else(PoisonError::into_inner);
             watch = waited.0;
         }
+        // Under the lock: the next command begins another one.
+        watch.has_thread = false;
     }
 
     /// Writes the stop, at each look until the driver lives again.

@@ -48,3 +48,20 @@ fn a_command_that_has_ended_is_not_stopped() {
     assert_eq!(second_written.recv_timeout(LONGEST).unwrap(), b"\x18");
     assert!(first_written.recv().is_err(), "nothing, until the device was closed");
 }
+
+#[test]
+fn a_guard_that_ended_at_rest_begins_again_with_the_next_command() {
+    let (writer, written) = device();
+    let mut guard = Guard::resting_after(Clock::real(), Duration::ZERO);
+    guard.open(writer);
+    assert!(!guard.is_guarding());
+    guard.begin(b"!".to_vec());
+    assert!(guard.is_guarding());
+    guard.end();
+    while guard.is_guarding() {
+        thread::yield_now();
+    }
+    guard.begin(b"\x18".to_vec());
+    // On a machine that stood still meanwhile the first command was stopped as well.
+    while written.recv_timeout(LONGEST).unwrap() != b"\x18" {}
+}
