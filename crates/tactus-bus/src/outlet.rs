@@ -2,6 +2,9 @@
 //!
 //! A queue with messages calls the thread, once until the thread has come to it. Rigs therefore share no lock: whoever
 //! publishes touches only the rig's own queue and a channel that nobody waits for.
+//!
+//! Where many rigs call, the thread lets calls gather for a millisecond: it is woken once for all of them, and zenoh sends their
+//! messages in one packet.
 
 use std::{
     io,
@@ -10,6 +13,7 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
     thread::{self, JoinHandle},
+    time::Duration,
 };
 
 use tokio::sync::{Notify, mpsc};
@@ -24,6 +28,10 @@ use crate::{
 const WAITING_BYTES_MAX: usize = 16 << 20;
 /// Messages of one rig that are sent before it is the next one's turn.
 const AT_ONCE: usize = 64;
+/// Rigs that call at a time from which on calls gather.
+const MANY: usize = 3;
+/// Time in which calls gather.
+const GATHERING: Duration = Duration::from_millis(1);
 
 /// A rig's outgoing queues.
 #[derive(Debug)]
@@ -153,6 +161,18 @@ impl Carrier {
         let thread = thread::Builder::new().name(name.to_owned()).spawn(move || {
             while let Some(Call::Outlet(outlet)) = calls.blocking_recv() {
                 outlet.send();
+                let mut called = 1;
+                loop {
+                    match calls.try_recv() {
+                        Ok(Call::Outlet(outlet)) => outlet.send(),
+                        Ok(Call::End) => return,
+                        Err(_) => break,
+                    }
+                    called += 1;
+                }
+                if called >= MANY {
+                    thread::sleep(GATHERING);
+                }
             }
         })?;
         Ok(Self { caller: Caller(caller), thread })

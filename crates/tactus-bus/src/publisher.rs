@@ -1,6 +1,6 @@
 //! Publishing: calls that never wait, and the publishers of a rig's topics.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use tactus_schema::{
     Frame,
@@ -83,9 +83,9 @@ impl Publisher {
     }
 }
 
-/// The publishers of one lane.
+/// The publishers of one lane; no more room than they need, because every rig has them.
 #[derive(Debug)]
-pub(crate) struct TopicPublishers(BTreeMap<Topic, TopicPublisher>);
+pub(crate) struct TopicPublishers(Box<[(Topic, TopicPublisher)]>);
 
 /// Publisher and cache of one topic.
 #[derive(Debug)]
@@ -103,20 +103,20 @@ impl TopicPublishers {
         frames_kept: usize,
         history_queries: &Arc<Queue<HistoryQuery>>,
     ) -> Result<Self, BusError> {
-        let mut publishers = BTreeMap::new();
+        let mut publishers = Vec::new();
         for topic in Topic::ALL {
             if Policy::of(topic).lane == lane {
                 let declared =
                     TopicPublisher::declare(session, keys, topic, frames_kept, history_queries).await?;
-                publishers.insert(topic, declared);
+                publishers.push((topic, declared));
             }
         }
-        Ok(Self(publishers))
+        Ok(Self(publishers.into()))
     }
 
     /// Passes a message to zenoh; may wait for slow clients.
     pub(crate) fn publish(&self, Outgoing { topic, payload }: Outgoing) {
-        if let Some(publisher) = self.0.get(&topic) {
+        if let Some((_, publisher)) = self.0.iter().find(|(of, _)| *of == topic) {
             publisher.publish(payload);
         }
     }
