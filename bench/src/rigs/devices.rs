@@ -125,7 +125,7 @@ impl Server {
 
     /// Answers hosts until it is time to sample.
     fn attend_until(&mut self, due: Instant) {
-        let mut events = Vec::with_capacity(EVENTS_MAX);
+        let mut events = Vec::<epoll::Event>::with_capacity(EVENTS_MAX);
         loop {
             let left = due.saturating_duration_since(Instant::now());
             let timeout = Timespec::try_from(left).unwrap_or_default();
@@ -134,7 +134,6 @@ impl Server {
                 continue;
             }
             for event in events.drain(..) {
-                let event: epoll::Event = event;
                 let (number, is_line) = (event.data.u64() / 2, event.data.u64() % 2 == 1);
                 if let Ok(number) = usize::try_from(number) {
                     self.attend(number, is_line);
