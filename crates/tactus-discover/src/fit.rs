@@ -8,11 +8,13 @@
 //! derivatives; [`elimination`] takes off what [`gains`] and baselines fit, where baselines may follow a [`random_walk`]; [`grams`] are what
 //! is left. [`problem`] takes damped Gauss-Newton steps in the spread and in the parameters of the
 //! effects, each on its own [`scale`]; [`knots`] of free curves stay within their class. [`folds`] measures a model on fitted presses that
-//! its parameters have not seen, [`heldout`] on those that were not fitted. [`prepare`] splits the data and fits the base model, from which the search starts.
+//! its parameters have not seen, [`heldout`] on those that were not fitted, and [`estimates`] says how far it is
+//! off there because its numbers were estimated. [`prepare`] splits the data and fits the base model, from which the search starts.
 //!
 //! Each file names its sources.
 
 mod elimination;
+mod estimates;
 mod folds;
 mod gains;
 mod grams;

@@ -189,9 +189,9 @@ impl Noise {
         (1.0 + phi * phi) / (1.0 - phi * phi)
     }
 
-    /// Correlation of two readings that are `lag` frames apart.
+    /// Correlation of two readings that are `lag` frames apart, without what rounding adds.
     pub(crate) fn correlation_at(&self, lag: usize) -> f64 {
-        self.correlation.get(lag).copied().unwrap_or(0.0) + self.rounding_share
+        self.correlation.get(lag).copied().unwrap_or(0.0)
     }
 
     /// Number of frames after which readings are independent.

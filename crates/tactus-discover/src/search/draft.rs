@@ -163,8 +163,8 @@ impl Field<'_> {
 
 impl Search<'_> {
     /// Drafts what a model leaves, as an effect of this name. If what comes first is no draft, that which comes next is tried, as if the first
-    /// were not in the grammar.
-    pub(crate) fn draft(&self, at: &Fitted, name: &str) -> Result<Outcome, DiscoverError> {
+    /// were not in the grammar. Classes that the data refute are no reason against it.
+    pub(crate) fn draft(&self, at: &Fitted, name: &str, refuted: &[&str]) -> Result<Outcome, DiscoverError> {
         let sight = Arc::new(Sight::of(self.problem, at)?);
         self.reporter.enter(Stage::Drafting, "drafting what nobody has named");
         let atoms = grammar::atoms(self.problem, at, &sight, self.rounds);
@@ -179,7 +179,7 @@ impl Search<'_> {
             additions: &additions,
             weighed: &weighed,
             grams: &grams,
-            classes: self.classes(at)?,
+            classes: self.classes(at, refuted)?,
             count: atoms.len() as f64,
         };
         let mut why = NoDraft::NoGain;
@@ -324,13 +324,13 @@ impl Search<'_> {
         (0..FOLDS).filter(first_in).count()
     }
 
-    /// The classes whose first step comes nearest, with the logarithm of their odds.
-    fn classes(&self, at: &Fitted) -> Result<Vec<(&'static str, f64)>, DiscoverError> {
+    /// The classes whose first step comes nearest, with the logarithm of their odds, of those that are not refuted.
+    fn classes(&self, at: &Fitted, refuted: &[&str]) -> Result<Vec<(&'static str, f64)>, DiscoverError> {
         let pass = self.pass(at)?;
         let evidence = pass.evidence();
         let best = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), f64::NEG_INFINITY);
         let of = |(addition, gain): &(usize, Gain)| (pass.class_of(*addition), gain.ln_odds.max(0.0));
-        Ok(best.iter().map(of).take(3).collect())
+        Ok(best.iter().map(of).filter(|(class, _)| !refuted.contains(class)).take(3).collect())
     }
 
     /// The atom with a second covariate, if one gains more than a form is excused for; else as it is.

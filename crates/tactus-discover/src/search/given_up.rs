@@ -25,6 +25,15 @@ pub enum Because {
 }
 
 impl GivenUp {
+    /// True if the data do not bear the effect out: something without a name explains them better, or what its fit has not seen does not
+    /// confirm it.
+    pub(crate) const fn is_refuted(&self) -> bool {
+        match self.because {
+            Because::Rival(_) | Because::NearestForm(_) | Because::Unconfirmed => true,
+            Because::Little | Because::Other(_) => false,
+        }
+    }
+
     /// The reason as a clause, such as `a dependence on depth without a name explains more`.
     pub fn in_words(&self) -> String {
         match self.because {

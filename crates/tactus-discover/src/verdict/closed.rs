@@ -9,6 +9,8 @@
 //! share = E / (E + L)
 //! ```
 //!
+//! The second model's numbers have errors, as those of the truth would have: what these leave is known from the fit, and no part of `L`.
+//!
 //! A gap far below the noise is measured by this far better than by mean squares less that of the noise: of these the noise's own error may be
 //! as large as the gap. The standard error is that of a jackknife over presses.
 
@@ -28,7 +30,12 @@ pub struct Closed {
 type OfPress = [Sums; 3];
 
 /// What the second model closes of what the first one leaves, among the readings that `among` selects; `None` if nothing is left or closed.
-pub(super) fn closed([before, after]: [&Readings<'_>; 2], among: impl Fn(usize) -> bool) -> Option<Closed> {
+/// `of_estimates` is the mean square that the errors of the second model's numbers leave, in units of the noise's variance.
+pub(super) fn closed(
+    [before, after]: [&Readings<'_>; 2],
+    of_estimates: f64,
+    among: impl Fn(usize) -> bool,
+) -> Option<Closed> {
     let of_press = |press| -> OfPress {
         let lasting = after.late_sums(press, &among);
         let ([_, before], [_, after]) = (before.sums(press, &among), after.sums(press, &among));
@@ -43,7 +50,7 @@ pub(super) fn closed([before, after]: [&Readings<'_>; 2], among: impl Fn(usize) 
             let [sum, count] = of.iter().fold([0.0; 2], |sums, of| [0, 1].map(|k| sums[k] + of[which][k]));
             if count > 0.0 { sum / count } else { 0.0 }
         };
-        let (explained, left) = (mean(0), mean(1).max(certain).max(0.0));
+        let (explained, left) = (mean(0), (mean(1).max(certain) - of_estimates).max(0.0));
         let all = explained + left;
         (all > 0.0).then(|| explained / all)
     };

@@ -35,18 +35,20 @@ fn residuals(rms: f64, closes: f64, seed: u64) -> [Vec<f32>; 2] {
 fn seen(residuals: &[Vec<f32>; 2], noise: f64) -> Closed {
     let presses: Vec<Range<usize>> = (0..PRESSES).map(|press| press * FRAMES..(press + 1) * FRAMES).collect();
     let (noise_counts, unit_counts) = ([noise; ELEMENTS], [1.0; ELEMENTS]);
+    let signal = vec![0.0; residuals[0].len()];
     let readings = |residual| Readings {
         elements: ELEMENTS,
         residual,
+        signal: &signal,
         presses: &presses,
         noise_counts: &noise_counts,
         unit_counts: &unit_counts,
         lag: 1,
         correlation: 0.0,
-        late_correlation: 0.0,
+        rounding_share: 0.0,
         freedom: 500.0,
     };
-    closed([&readings(&residuals[0]), &readings(&residuals[1])], |_| true).unwrap()
+    closed([&readings(&residuals[0]), &readings(&residuals[1])], 0.0, |_| true).unwrap()
 }
 
 #[test]

@@ -10,7 +10,7 @@ use super::discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
     Inclusion, Level, Split, Stair, Unexplained, Verdict,
 };
-use super::drafting::{DraftedEffect, Drafting, drafted};
+use super::drafting::{DraftedEffect, Drafting, Leaves, drafted};
 use super::held_out::{HeldOutResidual, SEEN_NOISE, closed_share};
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, FoldsOf, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
@@ -142,10 +142,12 @@ pub(crate) fn conclude(
     let floor = prepared.floor_of(&of_grown);
     let [base_level, grown_level] = [&of_base, &of_grown].map(|held| prepared.level(held, floor));
     let upper_noise = grown_level.structured.map_or(f64::INFINITY, |part| part.upper_noise);
+    let closed = prepared.closed([&of_base, &of_grown], &grown, floor)?.filter(|_| p_value <= ALPHA);
     let evidence = Evidence {
         is_named: named || lattice.is_some() || !faulty.effects.is_empty(),
         is_missing: options.rule == Rule::Protocol && (p_value <= ALPHA || has_refused(&contests)),
         is_left,
+        is_worse: closed.is_some_and(|closed| closed.share < 0.0),
         upper_noise,
         tolerance_noise: options
             .tolerance_counts
@@ -153,12 +155,12 @@ pub(crate) fn conclude(
             .map_or(0.0, |(tolerance, noise)| tolerance / noise),
     };
     let verdict = evidence.verdict();
-    let Drafting { draft, model: with_draft } =
-        drafted(prepared, search, verdict, (&grown, &of_grown), floor)?;
+    let given_up = given_up(exchanged, &contests, &tentative, &steps);
+    let leaves = Leaves { verdict, is_left, grown: &grown, of_grown: &of_grown, given_up: &given_up };
+    let Drafting { draft, model: with_draft } = drafted(prepared, search, leaves, floor)?;
     let noise_counts = floor.rms_counts().unwrap_or(0.0);
     let levels = [base_level, grown_level].map(|level| level.heldout_rms_counts);
     let staircase = search.staircase(&grown, levels, &steps, draft.as_ref())?;
-    let given_up = given_up(exchanged, &contests, &tentative, &steps);
 
     let mut not_shown = lacking;
     not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.reach)));
@@ -196,10 +198,7 @@ pub(crate) fn conclude(
         contests,
         steps,
         tentative,
-        final_: Final {
-            level: grown_level,
-            closed: prepared.closed([&of_base, &of_grown], floor).filter(|_| p_value <= ALPHA),
-        },
+        final_: Final { level: grown_level, closed },
         verdict,
         draft,
         unexplained: if is_left && !is_clean {
@@ -346,6 +345,8 @@ struct Evidence {
     is_missing: bool,
     /// A test rejects the grown model.
     is_left: bool,
+    /// The grown model is further from the held-out presses than the base model.
+    is_worse: bool,
     /// Upper bound of what is structured in the grown model's residual.
     upper_noise: f64,
     /// The tolerance that was declared beforehand; 0 if none was.
@@ -361,7 +362,7 @@ impl Evidence {
             // No test rejects, but there may be more than one would overlook.
             (false, false) => Verdict::CannotJudge,
             (false, true) => Verdict::Unexplained,
-            (true, _) if is_little || is_seen && !self.is_left => Verdict::Explained,
+            (true, _) if is_little || is_seen && !self.is_left && !self.is_worse => Verdict::Explained,
             (true, _) => Verdict::PartlyExplained,
         }
     }

@@ -9,7 +9,7 @@ use super::held_out::HeldOutResidual;
 use crate::data::{DiscoverError, Floor};
 use crate::fit::{Fitted, Prepared, Term};
 use crate::next::DraftModel;
-use crate::search::{Drafted, NoDraft, POLISH_ROUNDS, Rule, Search};
+use crate::search::{ALPHA, Drafted, FLIPS, GivenUp, NoDraft, POLISH_ROUNDS, Rule, Search, sign_flip_p};
 
 /// A draft that closes less of what was left on held-out presses is partial.
 const CLOSED_LEAST: f64 = 0.7;
@@ -59,18 +59,33 @@ pub(super) struct Drafting {
     pub(super) model: Option<DraftModel>,
 }
 
-/// Drafts what a grown model leaves with this verdict, if that is anything.
+/// A grown model, and what is known of what it leaves.
+pub(super) struct Leaves<'a> {
+    pub(super) verdict: Verdict,
+    /// True if a test rejects the model.
+    pub(super) is_left: bool,
+    pub(super) grown: &'a Fitted,
+    pub(super) of_grown: &'a HeldOutResidual,
+    pub(super) given_up: &'a [GivenUp],
+}
+
+/// Drafts what a grown model leaves, if that is anything. What is left may be too little for the verdict and still be seen.
 pub(super) fn drafted(
     prepared: &Prepared<'_>,
     search: &Search<'_>,
-    verdict: Verdict,
-    (grown, of_grown): (&Fitted, &HeldOutResidual),
+    leaves: Leaves<'_>,
     floor: Floor,
 ) -> Result<Drafting, DiscoverError> {
-    let is_open = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
+    let Leaves { verdict, is_left, grown, of_grown, given_up } = leaves;
+    let is_open = match verdict {
+        Verdict::Unexplained | Verdict::PartlyExplained => true,
+        Verdict::Explained => is_left,
+        Verdict::NothingMissing | Verdict::CannotJudge => false,
+    };
     if !is_open || search.options.rule != Rule::Protocol {
         return Ok(Drafting::default());
     }
+    let refuted: Vec<&str> = given_up.iter().filter(|one| one.is_refuted()).map(|one| one.effect).collect();
     let known = &prepared.known.effects;
     let is_known = |name: &str| {
         known.iter().any(|effect| effect.name() == name)
@@ -80,10 +95,21 @@ pub(super) fn drafted(
     let numbers = 1..=known.len() + prepared.known.drafts.len() + 1;
     let name =
         numbers.map(|number| format!("draft-{number}")).find(|name| !is_known(name)).unwrap_or_default();
-    let found = match search.draft(grown, &name)? {
+    let found = match search.draft(grown, &name, &refuted)? {
         Ok(found) => *found,
+        // Names explain all that matters, and nothing describes the rest better.
+        Err(_) if verdict == Verdict::Explained => return Ok(Drafting::default()),
         Err(none) => return Ok(Drafting { draft: Some(Err(none)), model: None }),
     };
+    if verdict == Verdict::Explained {
+        let mut added = grown.parameters.terms.iter().skip(search.known_terms);
+        // So little, and where a name acts: it may be an error of the name's form.
+        let acts_with_a_name = added.any(|term| term.definition.stage() == found.draft.stage());
+        let gains = search.problem.heldout_gains(&grown.predicted, &found.at.predicted);
+        if acts_with_a_name || sign_flip_p(&gains, FLIPS, search.options.seed) > ALPHA {
+            return Ok(Drafting::default());
+        }
+    }
     let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest, alike } = found;
     let of_draft = prepared.held(&at.parameters)?;
     let model = at.parameters.terms.last().map(|term| DraftModel {
@@ -100,7 +126,7 @@ pub(super) fn drafted(
         folds,
         nearest,
         alike,
-        closed: prepared.closed([of_grown, &of_draft], floor),
+        closed: prepared.closed([of_grown, &of_draft], &at, floor)?,
         heldout_rms_before_counts: of_grown.rms_counts,
         heldout_rms_after_counts: of_draft.rms_counts,
         base: super::conclude::base_of(prepared, &at.parameters),
@@ -155,7 +181,7 @@ pub(crate) fn confirmation(
     Ok(Confirmation {
         strength,
         strength_se: Some(error).filter(|error| error.is_finite()),
-        closed: prepared.closed([&before, &after], floor),
+        closed: prepared.closed([&before, &after], &fitted, floor)?,
         heldout_rms_before_counts: before.rms_counts,
         heldout_rms_after_counts: after.rms_counts,
     })

@@ -1,7 +1,9 @@
+use std::f64::consts::TAU;
+
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, PipelineStage, When};
+use tactus_model::{Covariate, Effect};
 
 use crate::fixtures::{ELEMENTS, found, known, measured, processes};
 use crate::{Discovery, DraftedEffect, Frames, Known, NoDraft, Verdict, confirm};
@@ -17,16 +19,23 @@ fn with(more: impl Fn(&[f64], f64, usize) -> f64) -> (Known, Frames) {
 }
 
 fn with_noise(seed: u64, more: impl Fn(&[f64], f64, usize) -> f64) -> (Known, Frames) {
+    beside(&[], seed, |_, rises, depth_mm, element| more(rises, depth_mm, element))
+}
+
+/// The same beside effects, and from the frame of its press as well.
+fn beside(effects: &[Effect], seed: u64, more: impl Fn(usize, &[f64], f64, usize) -> f64) -> (Known, Frames) {
     let known = known();
-    let clean = measured(&known, &[], &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
+    let clean = measured(&known, effects, &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
     let mut upon = noise(seed);
     for (frame, upon) in upon.iter_mut().enumerate() {
         let rises: Vec<f64> =
             clean.counts_of(frame).iter().map(|counts| f64::from(*counts) - 100.0).collect();
         let depth_mm = -clean.position_mm[frame][2];
-        upon.iter_mut().enumerate().for_each(|(element, upon)| *upon += more(&rises, depth_mm, element));
+        for (element, upon) in upon.iter_mut().enumerate() {
+            *upon += more(frame % 30, &rises, depth_mm, element);
+        }
     }
-    let frames = measured(&known, &[], &upon);
+    let frames = measured(&known, effects, &upon);
     (known, frames)
 }
 
@@ -86,6 +95,52 @@ fn counts_that_come_with_contact_are_drafted_with_a_weight_for_each_element() {
     }
 }
 
+/// 10 frames a second see hardly more than its sign.
+#[test]
+fn what_swings_after_a_stop_is_drafted_frame_by_frame() {
+    let swings = |frame: usize| {
+        let since_s = (frame as f64 - 9.0) / 10.0;
+        if (10..20).contains(&frame) {
+            0.06 * (-since_s / 0.5).exp() * (TAU * 4.3 * since_s).sin()
+        } else {
+            0.0
+        }
+    };
+    let (known, frames) = beside(&[], 11, |frame, rises, _, element| rises[element] * swings(frame));
+    let found = found(&known, &frames);
+    let drafted = drafted(&found);
+    let draft = &drafted.draft;
+    assert!(matches!(draft.carrier, Carrier::OwnSignal | Carrier::Depth), "{draft:?}");
+    // In these presses, a stop is half a second after contact.
+    assert!(matches!(draft.covariates[0], Covariate::SinceTurn | Covariate::SinceContact), "{draft:?}");
+    assert!(!drafted.is_partial(), "{:?}", drafted.closed);
+}
+
+fn hardening() -> Effect {
+    Effect::new("hardening", [("growth_at_1_mm", 0.5), ("exponent", 2.0), ("own_share", 0.0)]).unwrap()
+}
+
+fn names(found: &Discovery) -> Vec<&'static str> {
+    found.steps.iter().map(|step| step.effect).collect()
+}
+
+#[test]
+fn what_is_too_little_for_the_verdict_is_drafted_if_it_acts_elsewhere_than_the_name() {
+    let shift = |_, _: &[f64], depth_mm, _| if depth_mm > 0.0 { 0.3 } else { 0.0 };
+    let (known, frames) = beside(&[hardening()], 11, shift);
+    let found = found(&known, &frames);
+    assert_eq!((names(&found), found.verdict), (vec!["hardening"], Verdict::Explained));
+    let draft = &drafted(&found).draft;
+    assert!(matches!(draft.carrier, Carrier::Counts | Carrier::EveryElement), "{draft:?}");
+}
+
+#[test]
+fn a_name_that_explains_all_has_no_draft_beside_it() {
+    let (known, frames) = beside(&[hardening()], 11, |_, _, _, _| 0.0);
+    let found = found(&known, &frames);
+    assert_eq!((names(&found), found.verdict, &found.draft), (vec!["hardening"], Verdict::Explained, &None));
+}
+
 #[test]
 fn nothing_is_drafted_where_nothing_is_missing() {
     let (known, frames) = with(|_, _, _| 0.0);
@@ -100,8 +155,7 @@ fn a_draft_in_the_library_is_found_by_its_name_and_leaves_nothing_to_draft() {
     let definition = drafted(&first).draft.clone().define().unwrap();
     let with_draft = Known { drafts: vec![definition], ..known };
     let second = found(&with_draft, &frames);
-    let names: Vec<&str> = second.steps.iter().map(|step| step.effect).collect();
-    assert_eq!(names, ["draft-1"]);
+    assert_eq!(names(&second), ["draft-1"]);
     assert!(second.draft.is_none() || second.draft == Some(Err(NoDraft::Noise)), "{:?}", second.draft);
 }
 

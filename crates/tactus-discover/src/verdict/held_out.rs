@@ -6,7 +6,7 @@ use super::closed::{Closed, closed};
 use super::discovery::{ElementGap, Level};
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, Noise, QUIETEST, turns};
-use crate::fit::{LOUD, Parameters, Prepared};
+use crate::fit::{Fitted, LOUD, Parameters, Prepared};
 
 /// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests.
 pub(super) const SEEN_NOISE: f64 = 2.0;
@@ -137,14 +137,22 @@ impl Prepared<'_> {
         (0..self.frames.len()).map(|frame| turns(self.frames, frame)).collect()
     }
 
-    /// How much of what a model leaves on held-out presses another model closes.
-    pub(super) fn closed(&self, [before, after]: [&HeldOutResidual; 2], floor: Floor) -> Option<Closed> {
+    /// How much of what a model leaves on held-out presses another model, the fitted one, closes.
+    pub(super) fn closed(
+        &self,
+        [before, after]: [&HeldOutResidual; 2],
+        fitted: &Fitted,
+        floor: Floor,
+    ) -> Result<Option<Closed>, DiscoverError> {
         let (elements, turns) = (self.frames.elements, self.turns());
+        let of_estimates = self.problem().estimation_error(fitted)?.unwrap_or(0.0);
         let of_before = |before: &Readings<'_>| {
-            let of_both = |after: &Readings<'_>| closed([before, after], |place| !turns[place / elements]);
+            let of_both = |after: &Readings<'_>| {
+                closed([before, after], of_estimates, |place| !turns[place / elements])
+            };
             self.on_readings(after, floor, of_both)?
         };
-        self.on_readings(before, floor, of_before)?
+        Ok(self.on_readings(before, floor, of_before).flatten())
     }
 
     fn structured_among(
@@ -167,18 +175,16 @@ impl Prepared<'_> {
         let scale = rms_counts / self.noise.rms_counts;
         let noise_counts: Vec<f64> = self.noise.by_element_counts.iter().map(|rms| rms * scale).collect();
         let lag = self.noise.memory_frames();
-        let late = Readings::late(lag);
-        let late_count = late.clone().count() as f64;
-        let late_correlation = late.map(|lag| self.noise.correlation_at(lag)).sum::<f64>() / late_count;
         Some(something(&Readings {
             elements: self.frames.elements,
             residual: &held.residual,
+            signal: &held.signal,
             presses: &self.heldout_presses(),
             unit_counts: &noise_counts.iter().map(|rms| rms.max(QUIETEST * rms_counts)).collect::<Vec<_>>(),
             noise_counts: &noise_counts,
             lag,
             correlation: self.noise.correlation_at(lag),
-            late_correlation,
+            rounding_share: self.noise.rounding_share,
             freedom: floor.freedom()?,
         }))
     }

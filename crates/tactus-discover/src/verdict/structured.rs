@@ -22,6 +22,7 @@
 
 use std::ops::{Range, RangeInclusive};
 
+use crate::fit::LOUD;
 use crate::numbers::student_95;
 
 /// The part of a model's residuals on held-out presses that is not noise.
@@ -46,6 +47,8 @@ pub(crate) struct Readings<'a> {
     pub(crate) elements: usize,
     /// In counts: frame by frame, element by element.
     pub(crate) residual: &'a [f32],
+    /// As predicted, in counts, for the same.
+    pub(crate) signal: &'a [f32],
     /// Frames of each press, or of each rest between presses.
     pub(crate) presses: &'a [Range<usize>],
     /// Standard deviation of the noise of each element; infinite for those without weight.
@@ -55,8 +58,8 @@ pub(crate) struct Readings<'a> {
     /// Frames after which the noise has forgotten itself, and the correlation that is left.
     pub(crate) lag: usize,
     pub(crate) correlation: f64,
-    /// Mean correlation that is left at [`late`](Readings::late) lags.
-    pub(crate) late_correlation: f64,
+    /// What rounding adds to that, the same for the same signal. Where there is no signal, the baseline takes it up.
+    pub(crate) rounding_share: f64,
     /// Degrees of freedom of the noise.
     pub(crate) freedom: f64,
 }
@@ -96,7 +99,14 @@ impl Readings<'_> {
         among(place).then(|| f64::from(self.residual[place]) / unit)
     }
 
-    /// Lags at which hardly anything of the noise is left, of which each shows what lasts: for this many frames of memory.
+    /// The correlation of a reading's noise with a later one, where the noise itself has this one left.
+    fn lasting(&self, correlation: f64, place: usize, noise_counts: f64) -> f64 {
+        let has_signal = f64::from(self.signal[place].abs()) > LOUD * noise_counts;
+        correlation + if has_signal { self.rounding_share } else { 0.0 }
+    }
+
+    /// Lags at which nothing of the noise is left, of which each shows what lasts: for this many frames of memory. A correlation that is
+    /// measured there is no more than its own error, which is of the size of a gap far below the noise.
     pub(super) const fn late(lag: usize) -> RangeInclusive<usize> {
         3 * lag..=9 * lag
     }
@@ -106,12 +116,16 @@ impl Readings<'_> {
         let mut sums = [0.0; 2];
         let elements = self.noise_counts.iter().zip(self.unit_counts).enumerate();
         for (element, (noise, unit)) in elements.filter(|(_, (noise, _))| noise.is_finite()) {
-            let own = self.late_correlation * (noise / unit).powi(2);
-            let value = |frame: usize| self.value(frame * self.elements + element, *unit, &among);
-            let values: Vec<Option<f64>> = press.clone().map(value).collect();
+            let variance = (noise / unit).powi(2);
+            let value = |frame: usize| {
+                let place = frame * self.elements + element;
+                let own = variance * self.lasting(0.0, place, *noise);
+                self.value(place, *unit, &among).map(|value| (value, own))
+            };
+            let values: Vec<Option<(f64, f64)>> = press.clone().map(value).collect();
             for lag in Self::late(self.lag) {
                 let pairs = values.iter().zip(values.iter().skip(lag));
-                for (now, then) in pairs.filter_map(|(now, then)| now.zip(*then)) {
+                for ((now, own), (then, _)) in pairs.filter_map(|(now, then)| now.zip(*then)) {
                     sums[0] += now * then - own;
                     sums[1] += 1.0;
                 }
@@ -133,7 +147,8 @@ impl Readings<'_> {
                 all[1] += 1.0;
                 let then = frame + self.lag;
                 if let Some(then) = press.contains(&then).then(|| value(then)).flatten() {
-                    lasting[0] += now * then - self.correlation * variance;
+                    let own = self.lasting(self.correlation, frame * self.elements + element, *noise);
+                    lasting[0] += now * then - own * variance;
                     lasting[1] += 1.0;
                 }
             }

@@ -38,12 +38,13 @@ impl Planted {
         let readings = Readings {
             elements: ELEMENTS,
             residual: &self.residual,
+            signal: &vec![0.0; self.residual.len()],
             presses: &self.presses,
             noise_counts: &[noise; ELEMENTS],
             unit_counts: &[noise; ELEMENTS],
             lag: 1,
             correlation: 0.0,
-            late_correlation: 0.0,
+            rounding_share: 0.0,
             freedom,
         };
         readings.structured(|_| true).unwrap()

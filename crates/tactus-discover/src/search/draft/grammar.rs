@@ -182,7 +182,15 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
         is_there.then(|| Atom { of_elements, ..Atom::of(carrier, when, covariate, knots) })
     };
     let mut found: Vec<Atom> = Vec::new();
-    found.extend(each(IN_CONTACT).chain(each(ELSEWHERE)).filter_map(|one| smooth(one, KNOTS, false)));
+    let of_all = || each(IN_CONTACT).chain(each(ELSEWHERE));
+    found.extend(of_all().filter_map(|one| smooth(one, KNOTS, false)));
+    // What follows an event may be over in some frames, or swing.
+    let fine = |one: Acting| {
+        let (carrier, when, covariate) = one;
+        let knots = sight.fine_knots(one);
+        (knots.len() > KNOTS).then(|| Atom::of(carrier, when, covariate, knots))
+    };
+    found.extend(of_all().filter(|(.., covariate)| is_since_an_event(*covariate)).filter_map(fine));
     found.extend(each(OF_EACH).filter_map(|one| smooth(one, OF_ELEMENTS, true)));
     found.extend(each(CONSTANT).flat_map(|(carrier, when, covariate)| {
         let place = sight.knots((carrier, when, covariate), 1);
@@ -207,6 +215,11 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
         }
     }
     found
+}
+
+/// True of a time since something happened.
+const fn is_since_an_event(covariate: Covariate) -> bool {
+    matches!(covariate, Covariate::SinceContact | Covariate::SinceTurn | Covariate::SinceRelease)
 }
 
 /// An atom with each other covariate that its carrier may have beside its own.

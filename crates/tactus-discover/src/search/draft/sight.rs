@@ -7,13 +7,15 @@ use tactus_model::effect::{Carrier, Draft, Law, When};
 use tactus_model::{Covariate, Seen, Trace};
 
 use super::grammar::{Acting, Atom};
-use crate::data::DiscoverError;
+use crate::data::{DiscoverError, interval_s};
 use crate::fit::{Direction, Fitted, Free, Grams, Problem, Term, hat};
 
 /// Readings below this share of the largest signal of their bin do not place knots.
 const LOUD_SHARE: f64 = 0.02;
 /// Two knots are apart by this share of the range at least.
 const APART_SHARE: f64 = 0.01;
+/// Two fine knots are apart by this share of the value at least, and by a frame.
+const FINE_SHARE: f64 = 0.2;
 /// Knots of the curve from which weights of elements are found.
 const KNOTS_OF_ELEMENTS: usize = 3;
 
@@ -26,6 +28,8 @@ pub(super) struct Sight {
     signal_mm: Vec<f64>,
     counts: Vec<f64>,
     array: tactus_model::Array,
+    /// Median time between frames.
+    interval_s: f64,
     /// Change of each reading by a unit of a carrier.
     units: Vec<(Carrier, Vec<f32>)>,
 }
@@ -65,6 +69,7 @@ impl Sight {
             signal_mm,
             counts: at.predicted.clone(),
             array: known.array.clone(),
+            interval_s: interval_s(frames),
             units: Vec::new(),
         };
         for carrier in Carrier::ALL {
@@ -108,6 +113,21 @@ impl Sight {
         for knot in 0..count {
             let value = values[knot * (values.len() - 1) / (count - 1).max(1)];
             if knots.last().is_none_or(|last| value - last > apart) {
+                knots.push(value);
+            }
+        }
+        knots
+    }
+
+    /// Places of knots of a curve that changes from frame to frame at first, and later more slowly.
+    pub(super) fn fine_knots(&self, of: Acting) -> Vec<f64> {
+        let mut values = self.values(of);
+        values.sort_by(f64::total_cmp);
+        let mut knots: Vec<f64> = Vec::new();
+        for value in values {
+            // The times of two frames are not quite an interval apart.
+            let apart = |last: &f64| (0.9 * self.interval_s).max(FINE_SHARE * last);
+            if knots.last().is_none_or(|last| value - last > apart(last)) {
                 knots.push(value);
             }
         }
