@@ -1,14 +1,14 @@
 //! The verdict: what was found, how much of the gap it closes, and what is left.
 //!
 //! A model's residual on held-out presses is noise and structure. [`structured`] bounds the structure from above, in units of the noise.
-//! The verdict depends on four things: whether effects were added, whether a test rejects the base model, whether one rejects the grown
-//! model, and that bound ([`conclude()`]). One of the tests is of the noise ([`own_noise`]): whether elements share it, and single readings.
+//! The verdict depends on five things: whether effects were added, whether a test rejects the base model, whether one rejects the grown
+//! model, whether that is further from the held-out presses than the base model, and that bound ([`conclude()`]). One of the tests is of the noise ([`own_noise`]): whether elements share it, and single readings.
 //! How much of the gap is closed, which may be far below the noise, is measured so that the noise cancels ([`closed`]).
 //!
 //! An added effect must be confirmed: fitted presses that its parameters have not seen, by five folds, must be nearer to the model with it than
-//! to the model without. The held-out presses are opened for the figures alone.
+//! to the model without. The held-out presses are opened for the figures and the verdict alone.
 //!
-//! Where the verdict leaves something unexplained, it is drafted ([`drafting`]). The report is a [`Discovery`].
+//! What is left and significant is drafted ([`drafting`]). The report is a [`Discovery`].
 
 mod closed;
 mod conclude;
