@@ -263,6 +263,11 @@ where
             StageError::Stopped { position_mm: self.position_mm() }
         } else if let Err(void) = command.check(now.mono) {
             void.into()
+        } else if command.is_motion()
+            && let Err(error) = self.guard.ready()
+        {
+            let reason = format!("no thread can guard it: {error}");
+            StageError::Refused { command: format!("{command:?}"), reason }
         } else {
             let now = since_start(now);
             let (leave, actions) = match command {
@@ -505,6 +510,13 @@ impl From<DeviceError> for Unsent {
 }
 
 impl StageCommand {
+    const fn is_motion(&self) -> bool {
+        match self {
+            Self::Home(_) | Self::MoveTo(_) => true,
+            Self::Look | Self::ClearAlarm => false,
+        }
+    }
+
     /// Checks that the command may still be sent.
     fn check(&self, now: MonoTime) -> Result<(), Void> {
         match self {

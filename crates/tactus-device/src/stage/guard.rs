@@ -3,7 +3,7 @@
 //! The driver gives signs of life. A thread of its own, which shares nothing with the driver's runtime, watches for them,
 //! and writes the stop to the device itself when they cease. It begins with a command, and lives on for a while after the last.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -56,6 +56,8 @@ struct Watch {
     halt: Option<Vec<u8>>,
     /// Somebody looks, or will look.
     has_thread: bool,
+    /// A command is about to begin.
+    is_awaited: bool,
     /// The driver is gone: the thread ends.
     is_over: bool,
 }
@@ -93,19 +95,27 @@ impl Guard {
         (watch.writer, watch.halt) = (writer, None);
     }
 
+    /// Sees to it that somebody looks before a command begins.
+    ///
+    /// # Errors
+    /// If nobody can. Then nothing may move.
+    pub(super) fn ready(&self) -> io::Result<()> {
+        let mut watch = self.shared.watch();
+        if watch.writer.is_some() && !watch.has_thread {
+            let (shared, span) = (Arc::clone(&self.shared), tracing::Span::current());
+            let guard = move || span.in_scope(|| shared.guard());
+            thread::Builder::new().name("stage-guard".into()).spawn(guard)?;
+            watch.has_thread = true;
+        }
+        watch.is_awaited = true;
+        Ok(())
+    }
+
     /// A command begins, which `halt` stops.
     pub(super) fn begin(&self, halt: Vec<u8>) {
         self.sign_of_life();
         let mut watch = self.shared.watch();
-        watch.halt = Some(halt);
-        if watch.writer.is_some() && !watch.has_thread {
-            let (shared, span) = (Arc::clone(&self.shared), tracing::Span::current());
-            let guard = move || span.in_scope(|| shared.guard());
-            match thread::Builder::new().name("stage-guard".into()).spawn(guard) {
-                Ok(_) => watch.has_thread = true,
-                Err(error) => tracing::error!(%error, "no thread to guard the stage's driver"),
-            }
-        }
+        (watch.halt, watch.is_awaited) = (Some(halt), false);
         drop(watch);
         self.shared.changed.notify_one();
     }
@@ -167,7 +177,7 @@ impl Shared {
                 let (rested, waited) =
                     self.changed.wait_timeout(watch, self.rest).unwrap_or_else(PoisonError::into_inner);
                 watch = rested;
-                if waited.timed_out() && watch.halt.is_none() {
+                if waited.timed_out() && watch.halt.is_none() && !watch.is_awaited {
                     break;
                 }
                 continue;
