@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 31] = [
+const ROWS: [&str; 32] = [
     "tactus-model",
     "tactus-solid",
     "tactus-scene",
@@ -25,6 +25,7 @@ const ROWS: [&str; 31] = [
     "tactus-bus",
     "tactus-live",
     "tactus-log",
+    "tactus-work",
     "tactus-hidden",
     "tactus-virtual",
     "tactus-usbip",
