@@ -230,10 +230,11 @@ solid-tools:
     {{ tools }}/solid/bin/pip install --quiet --requirement bench/peers/fem-requirements.txt
 
 # The table of docs/calibration-evidence.md: the paper's experiments on simulated rigs with different true parameters, calibrated by the
-# release build. 200 rigs take about 20 minutes on two cores; tests/e2e/truth.rs takes two of them and a coarse sweep in every test run.
-truth rigs="200":
-    cargo build --release --package tactus
-    TACTUS_TRUTH_RIGS={{ rigs }} TACTUS_TRUTH_POINTS=15 cargo test --release --package tactus-e2e --test e2e truth:: -- --nocapture
+# program `tactus`. 200 rigs take about 20 minutes on two cores. Results are in a folder for each build, so a rerun goes on where it ended;
+# machines that see the folder share the rigs. tests/e2e/truth.rs takes two rigs and a coarse sweep in every test run.
+truth rigs="200" folder="target/truth":
+    cargo build --profile dist --package tactus --package tactus-bench
+    target/dist/tactus-bench truth --rigs {{ rigs }} --work {{ folder }}/$(sha256sum target/dist/tactus | cut -c 1-12)
 
 # How fast the models are, how they grow, how far from the machine's limits: bench/README.md.
 bench:
@@ -308,7 +309,8 @@ discovery-glance:
     target/dist/tactus-bench evidence score --seeds sealed --size glance --work target/evidence/glance/work \
         --labels target/evidence/glance/labels --document docs/discovery-evidence.md --images docs/images
 
-# Some 1,500 sets, two to four hours on two cores; it goes on where it was cut off, and says how long it still takes.
+# Some 1,500 sets, two to four hours on two cores; it goes on where it was cut off, and says how long it still takes. Further workers help
+# by the same `evidence run`, also on machines that see the folder.
 # What discovery finds and names of hidden physics, beside other ways to go about it: docs/discovery-evidence.md.
 discovery-evidence: bench-discovery
     target/dist/tactus-bench evidence run --seeds sealed --size ablation --keep-tables

@@ -3,7 +3,7 @@
 //! A *campaign* is a list of sets, each made from its own seed ([`campaigns()`]). [`run()`] makes the sets, writes their
 //! labels into a separate folder, and starts the program `tactus`, which gets a measurement table and nothing else. Only
 //! [`read()`] opens the labels; it compares them with the reports. [`Scores`] counts the outcomes, [`summary()`],
-//! [`document()`] and [`pictures()`] present them.
+//! [`document()`] and [`pictures()`] present them. Any number of workers share the sets of a folder ([`tactus_work`]).
 
 mod ablation;
 mod campaign;
@@ -33,7 +33,7 @@ pub use outcome::{Named, Outcome, Truth, read};
 pub use picture::pictures;
 pub use progress::{Moment, moments, progress_table};
 pub use rate::{Rate, normal_share, quantile};
-pub use run::{Places, Progress, Ran, Workflow, run};
+pub use run::{Places, Ran, Workflow, run};
 pub use score::{
     Band, Cell, EffectScore, ORACLE_LEVEL, OutsideScore, PowerPoint, Scores, SetSize, Several, Shrink,
     Spread, Z_DETECTABLE, Z_NAMEABLE, Z_SEPARATE,

@@ -1,9 +1,7 @@
 //! `tactus-bench evidence`.
 
 use std::fs;
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::thread;
 
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand, ValueEnum};
@@ -13,6 +11,9 @@ use tactus_bench::evidence::{
     into_document, misses, moments, pictures, progress_table, quantile, read, run, separate, summary,
     twins_table,
 };
+use tactus_work::write_whole;
+
+use crate::worker_args::WorkerArgs;
 
 #[derive(Debug, Args)]
 pub(crate) struct EvidenceArgs {
@@ -22,13 +23,14 @@ pub(crate) struct EvidenceArgs {
 
 #[derive(Debug, Subcommand)]
 enum Part {
-    /// Makes sets, runs `tactus discover` on each and scores; continues an interrupted run.
+    /// Makes sets, runs `tactus discover` on each and scores; continues an interrupted run. Workers that have the same folders share the
+    /// sets.
     Run(RunArgs),
     /// Scores the sets that have been run.
     Score(WhichArgs),
     /// Writes into the labels of sets that have been run how far their physics is from the nearest wrong effect; continues an
-    /// interrupted run.
-    Separate(WhichArgs),
+    /// interrupted run. Workers that have the same folders share the sets.
+    Separate(SeparateArgs),
     /// Prints what each value of the search's constants would do on the tuning sets that have been run.
     Constants(WhichArgs),
     /// Prints how near rivals without a name come to the effects that are named in the tuning sets that have been run.
@@ -90,9 +92,8 @@ struct RunArgs {
     /// The program that discovers.
     #[arg(long, default_value = "target/dist/tactus")]
     tactus: PathBuf,
-    /// Sets that run at the same time; by default the number of cores.
-    #[arg(long)]
-    jobs: Option<NonZeroUsize>,
+    #[command(flatten)]
+    worker: WorkerArgs,
     /// A further argument of `tactus discover`; may be given several times.
     #[arg(long = "with", allow_hyphen_values = true)]
     more: Vec<String>,
@@ -102,6 +103,14 @@ struct RunArgs {
     /// Fail if the result of the slice is below its bounds.
     #[arg(long)]
     check: bool,
+}
+
+#[derive(Debug, Args)]
+struct SeparateArgs {
+    #[command(flatten)]
+    which: WhichArgs,
+    #[command(flatten)]
+    worker: WorkerArgs,
 }
 
 #[derive(Debug, Args)]
@@ -192,7 +201,7 @@ impl EvidenceArgs {
         match self.part {
             Part::Run(args) => args.run(),
             Part::Score(which) => which.score().map(drop),
-            Part::Separate(which) => which.separate(),
+            Part::Separate(args) => args.run(),
             Part::Constants(which) => which.constants(),
             Part::Contests(which) => which.contests(),
             Part::Progress(which) => which.progress(),
@@ -243,15 +252,11 @@ impl ActiveArgs {
 impl RunArgs {
     fn run(self) -> Result<()> {
         self.which.check_seeds()?;
-        let sets = self.which.sets();
-        let workflow = Workflow {
-            tactus: self.tactus,
-            more: self.more,
-            jobs: self.jobs.map_or_else(cores, usize::from),
-            keeps_tables: self.keep_tables,
-        };
-        run(&sets, &self.which.places(), &workflow, &|now| {
-            println!("{}/{} {}, {:.0} min left", now.done, now.total, now.id, now.left_s / 60.0);
+        let (sets, places) = (self.which.sets(), self.which.places());
+        let workflow = Workflow { tactus: self.tactus, more: self.more, keeps_tables: self.keep_tables };
+        let claims = places.work.join("claims").join("discovery");
+        self.worker.work("sets", claims, |worker, progress| {
+            run(&sets, self.which.seeds, &places, &workflow, worker, progress)
         })?;
         let outcomes = self.which.score()?;
         if !self.check {
@@ -263,6 +268,15 @@ impl RunArgs {
                 BOUNDS.check(&outcomes)
             }
         }
+    }
+}
+
+impl SeparateArgs {
+    fn run(&self) -> Result<()> {
+        self.which.check_seeds()?;
+        let (sets, places) = (self.which.sets(), self.which.places());
+        let claims = places.work.join("claims").join("separation");
+        self.worker.work("sets", claims, |worker, progress| separate(&sets, &places, worker, progress))
     }
 }
 
@@ -288,11 +302,6 @@ impl WhichArgs {
             work: self.work.clone().unwrap_or_else(|| folder.join("work")),
             labels: self.labels.clone().unwrap_or_else(|| folder.join("labels")),
         }
-    }
-
-    fn separate(&self) -> Result<()> {
-        self.check_seeds()?;
-        separate(&self.sets(), &self.places(), cores(), &|id| println!("{id}"))
     }
 
     fn constants(&self) -> Result<()> {
@@ -403,10 +412,6 @@ impl Bounds {
     }
 }
 
-fn cores() -> usize {
-    thread::available_parallelism().map_or(1, usize::from)
-}
-
 /// Replaces a part of a document.
 fn into(path: &Path, part: evidence::Part, text: &str) -> Result<()> {
     let before = fs::read_to_string(path).with_context(|| path.display().to_string())?;
@@ -415,8 +420,5 @@ fn into(path: &Path, part: evidence::Part, text: &str) -> Result<()> {
 }
 
 fn write(path: &Path, text: &str) -> Result<()> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    }
-    fs::write(path, text).with_context(|| path.display().to_string())
+    write_whole(path, text.as_bytes()).with_context(|| path.display().to_string())
 }

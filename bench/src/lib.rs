@@ -3,10 +3,11 @@
 //! The measurements of the forward model (`tactus-bench --help` and the criterion benchmark) use the same [`Tool`]s at the
 //! same [`Pose`]s on the same arrays, with each [`Method`] from pose to image. [`Fem`] is the finite element model of the
 //! covering. [`latency`] measures the way of a frame, and [`RigsTrial`] a service of many rigs. [`evidence`] measures something else: how
-//! well `tactus discover` finds and names hidden physics.
+//! well `tactus discover` finds and names hidden physics; so does [`truth`]: how well `tactus calibrate` recovers the parameters of rigs.
 
 pub mod evidence;
 pub mod latency;
+pub mod truth;
 
 mod acuity;
 mod calibration;
@@ -18,6 +19,7 @@ mod limits;
 mod method;
 mod models;
 mod press;
+mod program;
 mod rigs;
 
 pub use acuity::Acuity;

@@ -1,8 +1,10 @@
-//! `tactus-bench`: measurements of the models and of discovery, which the `bench` and `discovery` recipes of `just` run.
+//! `tactus-bench`: measurements of the models of discovery and of calibration, which the `bench`, `discovery` and `truth` recipes of `just` run.
 #![expect(clippy::print_stdout, reason = "standard output is this program's interface")]
 
 mod evidence_command;
 mod rigs_command;
+mod truth_command;
+mod worker_args;
 
 use std::{path::PathBuf, time::Duration};
 
@@ -19,6 +21,7 @@ use tactus_bus::Endpoint;
 use tactus_calibrate::acuity::Grid;
 use tactus_model::Array;
 use tactus_solid::fem::Bricks;
+use truth_command::TruthArgs;
 
 /// Measures speed, accuracy and growth of the models, and how well `tactus discover` works.
 #[derive(Debug, Parser)]
@@ -124,6 +127,9 @@ enum Part {
     Rigs(RigsArgs),
     /// How well `tactus discover` finds and names hidden physics.
     Evidence(EvidenceArgs),
+    /// How well `tactus calibrate` recovers the parameters of simulated rigs; continues an interrupted run. Workers that have the same folder
+    /// share the rigs.
+    Truth(TruthArgs),
 }
 
 fn main() -> Result<()> {
@@ -148,6 +154,7 @@ fn main() -> Result<()> {
         Part::Relay { device, endpoint } => latency::relay(&device, &endpoint, ready)?,
         Part::Rigs(args) => args.run()?,
         Part::Evidence(args) => args.run()?,
+        Part::Truth(args) => args.run()?,
     }
     Ok(())
 }

@@ -30,3 +30,4 @@ mod truth;
 mod unread;
 mod watch;
 mod web;
+mod workers;

@@ -8,6 +8,7 @@ mod link;
 mod tap;
 mod terminal;
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
@@ -20,7 +21,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
 use rustix::pty::{OpenptFlags, openpt, ptsname, unlockpt};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -77,6 +78,26 @@ pub fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
 }
 
+/// All files below a folder, by their paths in it, with what is in them. One that disappears meanwhile is left out.
+///
+/// # Panics
+/// If a folder cannot be read.
+pub fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(&next).into_iter().flatten() {
+            let path = entry.expect("a folder can be read").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if let Ok(content) = fs::read(&path) {
+                files.insert(path.strip_prefix(folder).expect("it is in the folder").to_owned(), content);
+            }
+        }
+    }
+    files
+}
+
 /// Output of a finished command.
 #[derive(Debug)]
 pub struct CommandOutput {
@@ -113,13 +134,20 @@ impl From<Output> for CommandOutput {
 /// # Panics
 /// If it cannot be started.
 pub fn tactus(folder: &Path, args: &[&str]) -> CommandOutput {
-    // What computes leaves the processor to services and virtual devices, which are tested in real time beside it.
-    let mut command = Command::new("nice");
-    command.arg("--adjustment=5").arg(binary("tactus"));
+    computed("tactus", folder, args)
+}
+
+/// As [`tactus()`], with another of our binaries.
+///
+/// # Panics
+/// If it cannot be started.
+pub fn computed(name: &str, folder: &Path, args: &[&str]) -> CommandOutput {
+    let mut command = computing();
+    command.arg(binary(name));
     // The lab's own effects are those of the test, not of the user.
     command.env("XDG_STATE_HOME", folder.join("state")).env_remove("STATE_DIRECTORY");
     command.args(args).current_dir(folder).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let child = command.spawn().expect("tactus starts");
+    let child = command.spawn().expect("the binary starts");
     let pid = pid_of(&child);
     let (running, ended) = mpsc::channel::<()>();
     thread::spawn(move || {
@@ -131,6 +159,13 @@ pub fn tactus(folder: &Path, args: &[&str]) -> CommandOutput {
     let output = child.wait_with_output();
     drop(running);
     output.expect("the output can be read").into()
+}
+
+/// What computes leaves the processor to services and virtual devices, which are tested in real time beside it.
+fn computing() -> Command {
+    let mut command = Command::new("nice");
+    command.arg("--adjustment=5");
+    command
 }
 
 fn pid_of(child: &Child) -> Pid {
@@ -157,6 +192,16 @@ impl Process {
     /// If it cannot be started.
     pub fn start(name: &str, folder: &Path, args: &[&str]) -> Self {
         Self::start_with(name, folder, args, &[], Stdio::piped(), None)
+    }
+
+    /// As [`Self::start`], with one that computes: as [`tactus()`], it leaves the processor to others.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn start_computing(name: &str, folder: &Path, args: &[&str]) -> Self {
+        let mut command = computing();
+        command.args(["env", "--default-signal=HUP,INT,QUIT,TERM"]).arg(binary(name));
+        Self::spawn(name, command, folder, args, Stdio::piped(), None)
     }
 
     /// As [`Self::start`], but any program, in a network namespace.
@@ -318,6 +363,17 @@ impl Process {
     /// If it has already ended.
     pub fn signal(&self, signal: Signal) {
         kill_process(pid_of(&self.child), signal).expect("the process is there");
+    }
+
+    /// Stops it where it is, and returns when all its threads stand still. [`Signal::CONT`] lets it go on.
+    ///
+    /// # Panics
+    /// If it has ended.
+    pub fn hold(&self) {
+        self.signal(Signal::STOP);
+        let status =
+            waitpid(Some(pid_of(&self.child)), WaitOptions::UNTRACED).expect("a child can be waited for");
+        assert!(status.is_some_and(|(_, status)| status.stopped()), "{} has ended: {status:?}", self.name);
     }
 
     /// Kills it, and returns when it is gone with all that it held: a port that it listened on is free again.

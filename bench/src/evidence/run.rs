@@ -1,20 +1,18 @@
 //! Makes sets and runs `tactus discover` on each.
 
-use std::fmt::Write;
 use std::fs::{self, File};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
-use std::time::Instant;
 
-use anyhow::{Context, Result, anyhow, bail, ensure};
-use rayon::ThreadPoolBuilder;
-use rayon::iter::{ParallelBridge, ParallelIterator};
+use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
+use serde_json::json;
+use tactus_work::{Now, Stop, Work, Worked, Worker, agree, work, write_whole};
+use tempfile::TempDir;
 
-use super::campaign::Planned;
-use super::timing::{Watched, watched};
+use super::campaign::{Planned, Seeds};
+use crate::program::{Watched, digest, watched};
 
 /// The folders of a campaign.
 #[derive(Debug, Clone)]
@@ -32,23 +30,8 @@ pub struct Workflow {
     pub tactus: PathBuf,
     /// Further arguments of `tactus discover`.
     pub more: Vec<String>,
-    /// Sets that run at the same time, each on one thread.
-    pub jobs: usize,
     /// Keeps the tables of measurements and of residuals, for the peers.
     pub keeps_tables: bool,
-}
-
-/// Progress of a campaign.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress<'a> {
-    /// Id of the set that was done last.
-    pub id: &'a str,
-    /// Sets done.
-    pub done: usize,
-    /// Sets in all.
-    pub total: usize,
-    /// Estimate of the remaining time.
-    pub left_s: f64,
 }
 
 /// The result of a run of the program.
@@ -102,127 +85,173 @@ impl Places {
     }
 }
 
-/// Makes every set, writes its label and runs the program on its table. Sets that are done already are skipped.
+/// Makes every set, writes its label and runs the program on its table, each on one thread, with the other workers that have the same folders.
+/// Sets that are done already are kept.
 ///
 /// # Errors
 /// If a set cannot be made, a file cannot be written or the program cannot be started, or if the folder has results of another
-/// build. A run of the program that fails is a result, not an error.
+/// build or of other arguments. A run of the program that fails is a result, not an error.
 pub fn run(
     sets: &[Planned],
+    seeds: Seeds,
     places: &Places,
     workflow: &Workflow,
-    progress: &(dyn Fn(Progress<'_>) + Sync),
-) -> Result<()> {
-    let program = digest(&workflow.tactus)?;
-    let mut open = Vec::new();
-    for set in sets {
-        if is_done(set, places, &program, workflow.keeps_tables)? {
-            continue;
+    worker: &Worker,
+    progress: &(dyn Fn(Option<&str>, Now) + Sync),
+) -> Result<Worked> {
+    let discoveries = Discoveries { places, workflow, program: digest(&workflow.tactus)? };
+    let path = places.work.join("terms.json");
+    if !path.exists() {
+        // The folder may have results that are older than terms.
+        for set in sets {
+            discoveries.is_done(set)?;
         }
-        open.push(set);
     }
-    let started = Instant::now();
-    let done = Mutex::new(0_usize);
-    let work = |set: &&Planned| -> Result<()> {
-        one(set, places, workflow, &program)?;
-        let mut done = done.lock().map_err(|_| anyhow!("a worker panicked"))?;
-        *done += 1;
-        let per_set_s = started.elapsed().as_secs_f64() / *done as f64;
-        progress(Progress {
-            id: &set.id,
-            done: sets.len() - open.len() + *done,
-            total: sets.len(),
-            left_s: per_set_s * (open.len() - *done) as f64,
-        });
+    let terms = [
+        ("program", json!(discoveries.program)),
+        ("arguments", json!(workflow.more)),
+        ("seeds", json!(seeds.name())),
+        ("frames", json!(sets.first().and_then(|set| set.recipe.frames))),
+    ];
+    agree(&path, terms)?;
+    work(&discoveries, sets, worker, progress)
+}
+
+/// The runs of the program on all sets.
+struct Discoveries<'a> {
+    places: &'a Places,
+    workflow: &'a Workflow,
+    /// SHA-256 of the program.
+    program: String,
+}
+
+/// A run of the program, before others see it.
+struct Discovery {
+    folder: TempDir,
+    label: Vec<u8>,
+    ran: Ran,
+}
+
+impl Discovery {
+    /// The measurement table.
+    const TABLE: &str = "set.parquet";
+    /// The folder of the results.
+    const OUT: &str = "out";
+    const STAGES: &str = "stages";
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+}
+
+impl Work for Discoveries<'_> {
+    type Piece = Planned;
+    type Made = Discovery;
+    type Error = anyhow::Error;
+
+    fn name(&self, set: &Planned) -> String {
+        set.id.clone()
+    }
+
+    fn is_done(&self, set: &Planned) -> Result<bool> {
+        let Self { places, workflow, program } = self;
+        let path = places.ran(&set.id);
+        if !path.exists() || !places.label(&set.id).exists() {
+            return Ok(false);
+        }
+        let text = fs::read_to_string(&path).with_context(|| at(&path))?;
+        let ran: Ran = serde_json::from_str(&text).with_context(|| at(&path))?;
+        ensure!(
+            ran.program == *program,
+            "{} is from another build of `tactus`: give another folder with --work, or remove this one",
+            path.display()
+        );
+        Ok(!workflow.keeps_tables
+            || !places.report(&set.id).exists()
+            || places.tables(&set.id).iter().all(|table| table.exists()))
+    }
+
+    fn make(&self, set: &Planned, stop: &Stop) -> Result<Option<Discovery>> {
+        let made = set.recipe.make().with_context(|| set.id.clone())?;
+        let label = serde_json::to_vec_pretty(&made.label).with_context(|| set.id.clone())?;
+        let now = self.now(set);
+        fs::create_dir_all(&now).with_context(|| at(&now))?;
+        let folder = TempDir::new_in(&now).with_context(|| at(&now))?;
+        let [table, out, stages, log] =
+            [Discovery::TABLE, Discovery::OUT, Discovery::STAGES, "log"].map(|name| folder.path().join(name));
+        made.write(&table).with_context(|| at(&table))?;
+        drop(made);
+        let mut discover = Command::new(&self.workflow.tactus);
+        discover.args(["--json", "discover", "--threads", "1", "--seed"]).arg(DISCOVERY_SEED.to_string());
+        discover.arg("--stages").arg(&stages).args(&self.workflow.more).arg("--out").arg(&out).arg(&table);
+        // No effects of the lab take part.
+        discover.env("XDG_STATE_HOME", folder.path()).env_remove("STATE_DIRECTORY");
+        discover.stdout(Stdio::null()).stderr(File::create(&log).with_context(|| at(&log))?);
+        // A terminal's Ctrl-C is for the worker alone, which ends the program.
+        discover.process_group(0);
+        let Some(Watched { exit, seconds, processor_s, peak_mib }) = watched(&mut discover, stop)? else {
+            drop(folder);
+            self.clear(set);
+            return Ok(None);
+        };
+        let told = || {
+            fs::read(&log).map(|text| String::from_utf8_lossy(&text).into_owned()).with_context(|| at(&log))
+        };
+        // Wrong arguments are an error of the campaign, not a result of a set.
+        if exit.code() == Some(USAGE) {
+            bail!("{}: {}", at(&self.workflow.tactus), told()?);
+        }
+        let said = if out.join("report.json").exists() { String::new() } else { told()? };
+        let program = self.program.clone();
+        let ran = Ran { program, seconds, processor_s, peak_mib, exit: exit.code(), said };
+        Ok(Some(Discovery { folder, label, ran }))
+    }
+
+    fn keep(&self, set: &Planned, discovery: Discovery) -> Result<()> {
+        let Self { places, workflow, .. } = self;
+        write(&places.label(&set.id), &discovery.label)?;
+        let out = discovery.path(Discovery::OUT);
+        let found = out.join("report.json");
+        if found.exists() {
+            moved(&found, &places.report(&set.id))?;
+            moved(&discovery.path(Discovery::STAGES), &places.stages(&set.id))?;
+            if workflow.keeps_tables {
+                let [kept_table, residuals] = places.tables(&set.id);
+                moved(&discovery.path(Discovery::TABLE), &kept_table)?;
+                moved(&out.join("residuals.parquet"), &residuals)?;
+            }
+        }
+        // This one says that the set is done.
+        let path = places.ran(&set.id);
+        write(&path, &serde_json::to_vec_pretty(&discovery.ran).with_context(|| at(&path))?)?;
+        drop(discovery);
+        self.clear(set);
         Ok(())
-    };
-    let pool = ThreadPoolBuilder::new().num_threads(workflow.jobs.max(1)).build()?;
-    pool.install(|| open.iter().par_bridge().try_for_each(work))
+    }
 }
 
-fn is_done(set: &Planned, places: &Places, program: &str, wants_tables: bool) -> Result<bool> {
-    let path = places.ran(&set.id);
-    if !path.exists() || !places.label(&set.id).exists() {
-        return Ok(false);
+impl Discoveries<'_> {
+    /// Folder of what is in work on a set: each worker has its own in it. The path that the program sees has the seed, not the set's name.
+    fn now(&self, set: &Planned) -> PathBuf {
+        self.places.work.join("now").join(format!("{:016x}", set.recipe.seed))
     }
-    let text = fs::read_to_string(&path).with_context(|| at(&path))?;
-    let ran: Ran = serde_json::from_str(&text).with_context(|| at(&path))?;
-    ensure!(
-        ran.program == program,
-        "{} is from another build of `tactus`: give another folder with --work, or remove this one",
-        path.display()
-    );
-    Ok(!wants_tables
-        || !places.report(&set.id).exists()
-        || places.tables(&set.id).iter().all(|table| table.exists()))
-}
 
-fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Result<()> {
-    let made = set.recipe.make().with_context(|| set.id.clone())?;
-    let label = places.label(&set.id);
-    write(&label, &serde_json::to_string_pretty(&made.label).with_context(|| at(&label))?)?;
-
-    // The path that the program sees has the seed, not the set's name.
-    let folder = places.work.join("now").join(format!("{:016x}", set.recipe.seed));
-    fs::create_dir_all(&folder).with_context(|| at(&folder))?;
-    let table = folder.join("set.parquet");
-    made.write(&table).with_context(|| at(&table))?;
-    drop(made);
-    let out = folder.join("out");
-    let [log, stages] = ["log", "stages"].map(|name| folder.join(name));
-    let mut discover = Command::new(&workflow.tactus);
-    discover.args(["--json", "discover", "--threads", "1", "--seed"]).arg(DISCOVERY_SEED.to_string());
-    discover.arg("--stages").arg(&stages).args(&workflow.more).arg("--out").arg(&out).arg(&table);
-    // No effects of the lab take part.
-    discover.env("XDG_STATE_HOME", &folder).env_remove("STATE_DIRECTORY");
-    discover.stdout(Stdio::null()).stderr(File::create(&log).with_context(|| at(&log))?);
-    let Watched { exit, seconds, processor_s, peak_mib } = watched(&mut discover)?;
-    let told =
-        || fs::read(&log).map(|text| String::from_utf8_lossy(&text).into_owned()).with_context(|| at(&log));
-    // Wrong arguments are an error of the campaign, not a result of a set.
-    if exit.code() == Some(USAGE) {
-        bail!("{}: {}", at(&workflow.tactus), told()?);
+    /// Removes it, with what workers have left that died in the set.
+    fn clear(&self, set: &Planned) {
+        // The program of a dead worker may still write.
+        drop(fs::remove_dir_all(self.now(set)));
     }
-    let found = out.join("report.json");
-    let said = if found.exists() {
-        moved(&found, &places.report(&set.id))?;
-        moved(&stages, &places.stages(&set.id))?;
-        if workflow.keeps_tables {
-            let [kept_table, residuals] = places.tables(&set.id);
-            moved(&table, &kept_table)?;
-            moved(&out.join("residuals.parquet"), &residuals)?;
-        }
-        String::new()
-    } else {
-        told()?
-    };
-    let ran = Ran { program: program.into(), seconds, processor_s, peak_mib, exit: exit.code(), said };
-    let path = places.ran(&set.id);
-    write(&path, &serde_json::to_string_pretty(&ran).with_context(|| at(&path))?)?;
-    fs::remove_dir_all(&folder).with_context(|| at(&folder))
-}
-
-fn digest(program: &Path) -> Result<String> {
-    let bytes = fs::read(program).with_context(|| at(program))?;
-    let mut digits = String::new();
-    for byte in Sha256::digest(bytes) {
-        write!(digits, "{byte:02x}")?;
-    }
-    Ok(digits)
 }
 
 fn moved(from: &Path, to: &Path) -> Result<()> {
-    with_folder(to)?;
+    if let Some(folder) = to.parent() {
+        fs::create_dir_all(folder).with_context(|| at(folder))?;
+    }
     fs::rename(from, to).with_context(|| at(from))
 }
 
-fn write(path: &Path, text: &str) -> Result<()> {
-    with_folder(path)?;
-    fs::write(path, text).with_context(|| at(path))
-}
-
-fn with_folder(path: &Path) -> Result<()> {
-    path.parent().map_or(Ok(()), |folder| fs::create_dir_all(folder).with_context(|| at(folder)))
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_whole(path, bytes).with_context(|| at(path))
 }
 
 fn at(path: &Path) -> String {

@@ -1,50 +1,69 @@
 //! Writes into each label how far its physics is from the nearest wrong effect.
 
-use std::fs;
-
 use anyhow::{Context, Result};
-use rayon::ThreadPoolBuilder;
-use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use tactus_sets::Label;
+use tactus_work::{Now, Stop, Work, Worked, Worker, work, write_whole};
 
 use super::campaign::Planned;
 use super::outcome::parsed;
 use super::run::Places;
 
 /// Fits the library's effects to the physics of each set that has a label, and keeps the fits there, for the scorer only. Labels that
-/// have them are skipped. `progress` gets the id of each set that was done.
+/// have them are kept as they are. Workers that have the same folders share the sets.
 ///
 /// # Errors
 /// If a label cannot be read or written.
 pub fn separate(
     sets: &[Planned],
     places: &Places,
-    jobs: usize,
-    progress: &(dyn Fn(&str) + Sync),
-) -> Result<()> {
-    let pool = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build()?;
-    pool.install(|| sets.par_iter().try_for_each(|set| one(set, places, progress)))
+    worker: &Worker,
+    progress: &(dyn Fn(Option<&str>, Now) + Sync),
+) -> Result<Worked> {
+    work(&Separations { places }, sets, worker, progress)
 }
 
-fn one(set: &Planned, places: &Places, progress: &(dyn Fn(&str) + Sync)) -> Result<()> {
-    let path = places.label(&set.id);
-    if !path.exists() {
-        return Ok(());
+/// The fits to all sets.
+struct Separations<'a> {
+    places: &'a Places,
+}
+
+impl Separations<'_> {
+    /// The label of a set, if it has one.
+    fn label(&self, set: &Planned) -> Result<Option<Label>> {
+        let path = self.places.label(&set.id);
+        path.exists().then(|| parsed(&path)).transpose()
     }
-    let mut label: Label = parsed(&path)?;
-    let mut is_new = false;
-    for dosed in &mut label.physics {
-        if dosed.z_of_effects.is_empty() {
-            dosed.z_of_effects = set.recipe.class_fits(dosed).with_context(|| set.id.clone())?.effects;
-            is_new = true;
+}
+
+impl Work for Separations<'_> {
+    type Piece = Planned;
+    type Made = Label;
+    type Error = anyhow::Error;
+
+    fn name(&self, set: &Planned) -> String {
+        set.id.clone()
+    }
+
+    fn is_done(&self, set: &Planned) -> Result<bool> {
+        let label = self.label(set)?;
+        Ok(label.is_none_or(|label| label.physics.iter().all(|dosed| !dosed.z_of_effects.is_empty())))
+    }
+
+    fn make(&self, set: &Planned, stop: &Stop) -> Result<Option<Label>> {
+        let mut label = self.label(set)?.with_context(|| format!("{} had a label", set.id))?;
+        for dosed in label.physics.iter_mut().filter(|dosed| dosed.z_of_effects.is_empty()) {
+            let (recipe, physics) = (set.recipe.clone(), dosed.clone());
+            let Some(fits) = stop.unless_set(move || recipe.class_fits(&physics)) else { return Ok(None) };
+            dosed.z_of_effects = fits.with_context(|| set.id.clone())?.effects;
         }
+        Ok(Some(label))
     }
-    if is_new {
-        let text = serde_json::to_string_pretty(&label).with_context(|| set.id.clone())?;
-        fs::write(&path, text).with_context(|| path.display().to_string())?;
-        progress(&set.id);
+
+    fn keep(&self, set: &Planned, label: Label) -> Result<()> {
+        let path = self.places.label(&set.id);
+        let text = serde_json::to_vec_pretty(&label).with_context(|| set.id.clone())?;
+        write_whole(&path, &text).with_context(|| path.display().to_string())
     }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::fs;
+use std::num::NonZeroUsize;
+use std::time::Duration;
 
 use tactus_sets::{Content, Recipe};
+use tactus_work::Claims;
 
 use super::super::campaign::Campaign;
 use super::*;
@@ -15,14 +18,17 @@ fn a_label_gets_its_separation_once() -> Result<()> {
     let path = places.label(&set.id);
     fs::create_dir_all(path.parent().context("a folder")?)?;
     fs::write(&path, serde_json::to_string(&set.recipe.make()?.label)?)?;
-    let done = AtomicUsize::new(0);
-    for _ in 0..2 {
-        separate(std::slice::from_ref(&set), &places, 1, &|_| _ = done.fetch_add(1, Ordering::Relaxed))?;
-    }
+    let worker = Worker {
+        claims: Claims::new(folder.join("claims"), Duration::from_mins(1)),
+        threads: NonZeroUsize::MIN,
+        stop: Stop::default(),
+    };
+    let separated = || separate(std::slice::from_ref(&set), &places, &worker, &|_, _| ());
+    let done = [separated()?.done, separated()?.done];
     let label: Label = parsed(&path)?;
     fs::remove_dir_all(&folder)?;
     let fits = label.physics[0].class_fits().context("it has them")?;
-    assert_eq!(done.into_inner(), 1);
+    assert_eq!(done, [1, 0]);
     assert_eq!(fits.effects.len(), tactus_model::effect::REGISTRY.len());
     let nearest = fits.z_name(Some("surface-offset")).context("it is an effect")?;
     assert!(nearest > 0.0 && nearest <= 1.001 * fits.base, "{nearest} of {}", fits.base);

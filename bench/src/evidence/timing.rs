@@ -2,16 +2,17 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Command, Stdio};
 use std::thread;
-use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use tactus_sets::{Content, Plan, Recipe};
+use tactus_work::Stop;
 
 use super::rate::quantile;
 use crate::Growth;
+use crate::program::{Watched, kib, watched};
 
 /// Time and memory at several sizes, on all cores.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -42,8 +43,6 @@ pub struct Cost {
 
 /// Two physics of a bad rig, so that the search takes several rounds.
 const PHYSICS: [&str; 2] = ["relaxation-prony", "shifted-mount"];
-/// Time between two readings of the memory.
-const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
 impl Timing {
     /// Makes a set of each size by the plan of the experiment `diagnose`, and runs `tactus discover` on it `runs` times.
@@ -93,62 +92,12 @@ fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<Watched> {
     discover.args(["--json", "discover", "--out"]).arg(out).arg(table).stdout(Stdio::null());
     // No effects of the lab take part.
     discover.env("XDG_STATE_HOME", out).env_remove("STATE_DIRECTORY");
-    let ended = watched(&mut discover)?;
+    let ended = watched(&mut discover, &Stop::default())?.context("nothing stops it")?;
     ensure!(ended.exit.success(), "{} {} failed: {}", tactus.display(), table.display(), ended.exit);
     Ok(ended)
-}
-
-/// A program that was watched until its end.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Watched {
-    pub(super) exit: ExitStatus,
-    pub(super) seconds: f64,
-    /// Time of the processor on all cores.
-    pub(super) processor_s: f64,
-    /// Greatest resident memory.
-    pub(super) peak_mib: f64,
-}
-
-/// Runs a program to its end.
-pub(super) fn watched(command: &mut Command) -> Result<Watched> {
-    let started = Instant::now();
-    let mut child = command.spawn().with_context(|| command.get_program().to_string_lossy().into_owned())?;
-    let process = child.id();
-    let about = |what: &str| fs::read_to_string(format!("/proc/{process}/{what}")).ok();
-    let (mut peak_kib, mut processor_s) = (0.0_f64, 0.0_f64);
-    loop {
-        // The files are gone once the process has ended; the last values stay.
-        let most_kib = about("status").and_then(|text| kib(&text, "VmHWM:"));
-        peak_kib = peak_kib.max(most_kib.unwrap_or(0.0));
-        let used_s = about("stat").and_then(|text| self::processor_s(&text));
-        processor_s = processor_s.max(used_s.unwrap_or(0.0));
-        if let Some(exit) = child.try_wait()? {
-            let seconds = started.elapsed().as_secs_f64();
-            return Ok(Watched { exit, seconds, processor_s, peak_mib: peak_kib / 1024.0 });
-        }
-        thread::sleep(LOOK_AGAIN);
-    }
 }
 
 /// Memory that is available to programs.
 fn available_mib() -> Option<f64> {
     Some(kib(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")? / 1024.0)
 }
-
-/// Time of the processor in `/proc/PID/stat`: in user mode and in the kernel's, in hundredths of a second (proc(5), `USER_HZ`).
-fn processor_s(stat: &str) -> Option<f64> {
-    // The name of the program, in brackets, may have spaces.
-    let (_, after_name) = stat.rsplit_once(')')?;
-    let mut fields = after_name.split_whitespace().skip(11);
-    let mut hundredths = || fields.next()?.parse::<f64>().ok();
-    Some((hundredths()? + hundredths()?) / 100.0)
-}
-
-/// The value of a line of the kernel, such as `VmHWM:   231596 kB`.
-fn kib(lines: &str, name: &str) -> Option<f64> {
-    lines.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
-}
-
-#[cfg(test)]
-#[path = "timing_tests.rs"]
-mod tests;
