@@ -3,11 +3,12 @@
 #[cfg(feature = "cluster")]
 use std::net::SocketAddr;
 use std::{
-    fs, io,
+    io,
     num::NonZeroUsize,
     path::{Path, PathBuf},
     process::ExitCode,
     thread,
+    time::Duration,
 };
 
 use anyhow::{Context as _, bail};
@@ -15,6 +16,7 @@ use clap::{Args, Parser, Subcommand};
 use jiff::civil::Date;
 use serde::Serialize;
 use tactus_report::fleet::{FleetReport, Trend, fleet_html};
+use tactus_work::{Bar, Claims, LEASE_S, Stop, Worked, Worker, cores, write_whole};
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 use tokio::sync::oneshot;
@@ -26,9 +28,8 @@ use crate::{
     exit::{Exit, in_words},
     ingest,
     output::{self, number_of},
-    progress::Progress,
     query::{Limits, Lines, OutFile, Query, Table},
-    survey::{Analysis, Calibrated, Discovered, Surveyed, findings, results, survey},
+    survey::{self, Analysis, Calibrated, Discovered, findings, results, survey},
 };
 
 /// Many recordings in one place: Parquet by rig and date.
@@ -54,7 +55,7 @@ struct Common {
 
 impl Common {
     fn threads(&self) -> NonZeroUsize {
-        self.threads.or_else(|| thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN)
+        self.threads.unwrap_or_else(cores)
     }
 }
 
@@ -62,9 +63,11 @@ impl Common {
 enum FleetCommand {
     /// Write recordings and measurement tables into a fleet: one Parquet file per run. Runs that are there already are kept.
     Ingest(IngestArgs),
-    /// Calibrate each run by itself; report which sensors drift and which coverings age. Runs that were calibrated before are kept.
+    /// Calibrate each run by itself; report which sensors drift and which coverings age. Runs that were calibrated before are kept. Workers
+    /// that have the same --out share the runs.
     Calibrate(SurveyArgs),
-    /// Search each run for effects that its rig's model lacks; report which rigs share one. Runs that were searched before are kept.
+    /// Search each run for effects that its rig's model lacks; report which rigs share one. Runs that were searched before are kept. Workers
+    /// that have the same --out share the runs.
     Discover(SurveyArgs),
     /// Ask all frames and runs in SQL.
     Query(QueryArgs),
@@ -104,6 +107,9 @@ struct SurveyArgs {
     /// Folder for the result of each run, and for report.html and report.json, which calibrations and discoveries share.
     #[arg(long, value_name = "DIR", default_value = "survey")]
     out: PathBuf,
+    /// Another worker takes over the runs of one that is silent for so long: a process or a machine that died.
+    #[arg(long, value_name = "SECONDS", default_value_t = LEASE_S, value_parser = clap::value_parser!(u64).range(1..))]
+    lease_s: u64,
 }
 
 #[derive(Debug, Args)]
@@ -190,7 +196,7 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
 
 fn run_ingest(runtime: &Runtime, common: &Common, args: &IngestArgs) -> anyhow::Result<Exit> {
     let place = Place::create(&args.to)?;
-    let progress = Progress::new(common.json);
+    let progress = Bar::new("files", common.json);
     let options = IngestOptions { threads: common.threads(), date: args.date };
     let ingested = ingest(runtime.handle(), &args.runs, &place, &options, &|now| progress.show(now))?;
     progress.clear();
@@ -204,17 +210,29 @@ fn run_ingest(runtime: &Runtime, common: &Common, args: &IngestArgs) -> anyhow::
 
 fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs) -> anyhow::Result<Exit> {
     let (place, runtime) = (Place::at(&args.fleet.at)?, runtime.handle());
-    let progress = Progress::new(common.json);
-    let surveyed = survey::<T>(runtime, &place, &args.out, common.threads(), &|now| progress.show(now))?;
+    let worker = Worker {
+        claims: Claims::new(survey::claims::<T>(&args.out), Duration::from_secs(args.lease_s)),
+        threads: common.threads(),
+        stop: Stop::on_signals().context("signals cannot be received")?,
+    };
+    let progress = Bar::new("runs", common.json);
+    let worked = survey::<T>(runtime, &place, &args.out, &worker, &|now| progress.show(now))?;
     progress.clear();
+    for run in &worked.lost {
+        eprintln!("warning: {run} was taken over by another worker: this one had been silent for its lease");
+    }
+    if worked.left > 0 {
+        bail!("stopped; {} not done: the same command goes on", number_of(worked.left as u64, "run"));
+    }
     let calibrated = results::<Calibrated>(runtime, &place, &args.out)?;
     let discovered = results::<Discovered>(runtime, &place, &args.out)?;
     let report = findings(place.url().as_str(), &calibrated, &discovered);
+    let surveyed = Surveyed::from(&worked);
     let json =
         serde_json::to_string_pretty(&SurveyJson { schema: SURVEY_SCHEMA, surveyed, report: &report })?;
     let page = args.out.join("report.html");
     for (path, text) in [(&page, &fleet_html(&report)), (&args.out.join("report.json"), &json)] {
-        fs::write(path, text).with_context(|| path.display().to_string())?;
+        write_whole(path, text.as_bytes()).with_context(|| path.display().to_string())?;
     }
     if common.json {
         output::write(&format!("{json}\n"))?;
@@ -295,7 +313,7 @@ async fn ask(place: &Place, spill: &Path, common: &Common, args: &QueryArgs) -> 
     };
     let query = Query::new(place, &args.sql, &limits).await?;
     let mut progress = None;
-    let show = |now| progress.get_or_insert_with(|| Progress::new(common.json)).show(now);
+    let show = |now| progress.get_or_insert_with(|| Bar::new("files", common.json)).show(now);
     if let Some(path) = &args.out {
         let mut file = OutFile::create(path, &query.columns())?;
         query.run(&mut file, show).await?;
@@ -336,6 +354,24 @@ fn bytes(gb: f64) -> usize {
 /// What `--json` prints of a query whose rows are in a file.
 const QUERY_SCHEMA: &str = "tactus.fleet.query/1";
 
+/// What became of the runs.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Surveyed {
+    #[serde(rename = "runs_analysed")]
+    analysed: usize,
+    /// Analysed meanwhile by other workers.
+    #[serde(rename = "runs_by_others")]
+    by_others: usize,
+    #[serde(rename = "runs_kept")]
+    kept: usize,
+}
+
+impl From<&Worked> for Surveyed {
+    fn from(worked: &Worked) -> Self {
+        Self { analysed: worked.done, by_others: worked.by_others, kept: worked.kept }
+    }
+}
+
 /// `report.json`, and what `--json` prints.
 #[derive(Serialize)]
 struct SurveyJson<'a> {
@@ -354,6 +390,10 @@ fn in_short(surveyed: &Surveyed, report: &FleetReport, page: &Path) -> String {
     let shared = report.effects.iter().filter(|effect| effect.shared).map(|effect| effect.effect.as_str());
     let shared: Vec<&str> = shared.collect();
     let simulated = if report.simulated { " (SIMULATED)" } else { "" };
+    let by_others = match surveyed.by_others {
+        0 => String::new(),
+        number => format!(", {number} by other workers"),
+    };
     let refused = match report.refused.as_slice() {
         [] => String::new(),
         refused => {
@@ -361,13 +401,13 @@ fn in_short(surveyed: &Surveyed, report: &FleetReport, page: &Path) -> String {
         }
     };
     format!(
-        "runs         {} analysed, {} kept, of {}{simulated}\n\
+        "runs         {} analysed{by_others}, {} kept, of {}{simulated}\n\
          drifts       {} of {}\n\
          coverings    {} of {} age\n\
          shared       {}\n\
          {refused}report       {}\n",
-        surveyed.runs_analysed,
-        surveyed.runs_kept,
+        surveyed.analysed,
+        surveyed.kept,
         number_of(report.rigs, "rig"),
         changing(&report.drifts),
         report.drifts.len(),

@@ -18,13 +18,12 @@ use jiff::civil::Date;
 use serde::Serialize;
 use tactus_record::{RowsError, rows};
 use tactus_schema::{Rig, table::RowView};
+use tactus_work::{Now, for_each};
 use tokio::runtime::Handle;
 
 use crate::{
     Place,
     output::{in_mb, number_of},
-    progress::Now,
-    threads::for_each,
 };
 use found::{Job, Source, found};
 use run_writer::{RunWriter, WriteError, Written};
@@ -110,10 +109,10 @@ pub fn ingest(
     let (jobs, unreadable) = found(paths)?;
     let shared = Shared {
         now: Mutex::new(Now {
-            files: 0,
-            files_all: jobs.iter().map(|job| job.sources.len()).sum(),
-            bytes: 0,
-            bytes_all: jobs.iter().flat_map(|job| &job.sources).map(|source| source.bytes).sum(),
+            pieces: 0,
+            pieces_all: jobs.iter().map(|job| job.sources.len()).sum(),
+            size: 0,
+            size_all: jobs.iter().flat_map(|job| &job.sources).map(|source| source.bytes).sum(),
         }),
         ingested: Mutex::new(Ingested {
             schema: SCHEMA,
@@ -152,8 +151,8 @@ impl Shared {
             }
         }
         let mut now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
-        now.files += job.sources.len();
-        now.bytes += job.sources.iter().map(|source| source.bytes).sum::<u64>();
+        now.pieces += job.sources.len();
+        now.size += job.sources.iter().map(|source| source.bytes).sum::<u64>();
         progress(*now);
     }
 }

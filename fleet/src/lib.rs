@@ -12,8 +12,7 @@
 //! | `ingest` | from recordings to files |
 //! | `cluster` | a query on several machines, with the feature of that name |
 //! | `query` | SQL over all runs |
-//! | `survey` | calibration and discovery of every run, and what they say together |
-//! | `threads` | how both share their work |
+//! | `survey` | calibration and discovery of every run, by as many workers as there are, and what they say together |
 #![expect(clippy::print_stderr, reason = "errors go to standard error, results to standard output")]
 
 mod cli;
@@ -24,14 +23,12 @@ mod exit;
 mod ingest;
 mod output;
 mod place;
-mod progress;
 mod query;
 mod run_head;
 mod survey;
-mod threads;
 
 pub use cli::main;
 pub use ingest::{FailedFile, IngestError, Ingested, Options as IngestOptions, ingest};
 pub use place::{Place, PlaceError};
-pub use progress::Now;
 pub use run_head::RunHead;
+pub use tactus_work::Now;

@@ -39,7 +39,9 @@ use tokio::time::{Instant, interval_at};
 
 #[cfg(feature = "cluster")]
 use crate::cluster;
-use crate::{Place, progress::Now};
+use tactus_work::Now;
+
+use crate::Place;
 
 pub(crate) use answer::{Answer, Lines, OutFile, Table};
 use problem::in_words;
@@ -115,7 +117,7 @@ impl Query {
                 },
                 _ = ticks.tick() => match self.scanned() {
                     // A cluster does not say how far it is.
-                    Now { files_all: 0, .. } => {}
+                    Now { pieces_all: 0, .. } => {}
                     now => show(now),
                 },
             }
@@ -124,7 +126,7 @@ impl Query {
 
     /// How many of the files that the query reads are done.
     fn scanned(&self) -> Now {
-        let mut now = Now { files: 0, files_all: 0, bytes: 0, bytes_all: 0 };
+        let mut now = Now::default();
         add_scans(&self.plan, &mut now);
         now
     }
@@ -135,10 +137,10 @@ fn add_scans(plan: &Arc<dyn ExecutionPlan>, now: &mut Now) {
     if let Some(scan) = plan.downcast_ref::<DataSourceExec>()
         && let Some(files) = scan.data_source().downcast_ref::<FileScanConfig>()
     {
-        now.files_all += files.file_groups.iter().map(FileGroup::len).sum::<usize>();
+        now.pieces_all += files.file_groups.iter().map(FileGroup::len).sum::<usize>();
         let done = scan.metrics().and_then(|metrics| metrics.sum_by_name("files_processed"));
-        now.files += done.map_or(0, |done| done.as_usize());
-        (now.bytes, now.bytes_all) = (now.files as u64, now.files_all as u64);
+        now.pieces += done.map_or(0, |done| done.as_usize());
+        (now.size, now.size_all) = (now.pieces as u64, now.pieces_all as u64);
     }
     for input in plan.children() {
         add_scans(input, now);

@@ -1,7 +1,7 @@
 //! Calibration and discovery of every run of a fleet, and what their results say together.
 //!
-//! Threads take one run after the other. The result of each is a file of its own in the output folder, so an interrupted survey goes on
-//! where it ended; a run whose file in the fleet has changed is done again. Memory holds one run for each thread.
+//! The result of each run is a file of its own in the output folder. Workers of one folder share the runs ([`tactus_work`]). A run whose
+//! file in the fleet has changed is done again. Memory holds one run for each thread.
 
 mod calibrated;
 mod discovered;
@@ -10,26 +10,26 @@ mod trend;
 
 use std::{
     fs, io,
-    num::NonZeroUsize,
+    marker::PhantomData,
     path::{Path, PathBuf},
-    sync::{Mutex, PoisonError},
 };
 
 use anyhow::Context as _;
 use futures::TryStreamExt as _;
 use object_store::{ObjectMeta, ObjectStoreExt as _};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use tactus_work::{Now, Stop, Work, Worked, Worker, work, write_whole};
 use tempfile::NamedTempFile;
 use tokio::{io::AsyncWriteExt as _, runtime::Handle};
 
-use crate::{Place, RunHead, progress::Now, threads::for_each};
+use crate::{Place, RunHead};
 
 pub(crate) use calibrated::Calibrated;
 pub(crate) use discovered::Discovered;
 pub(crate) use findings::findings;
 
 /// What a survey does with each run.
-pub(crate) trait Analysis: Serialize + DeserializeOwned + Send {
+pub(crate) trait Analysis: Serialize + DeserializeOwned + Send + 'static {
     /// Name of the folder of its results.
     const NAME: &'static str;
 
@@ -81,73 +81,73 @@ impl<T> RunResult<T> {
     }
 }
 
-/// What a survey did.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
-pub(crate) struct Surveyed {
-    pub(crate) runs_analysed: u64,
-    pub(crate) runs_kept: u64,
-}
-
-/// Analyses every run that has no result in `out` yet.
+/// Analyses every run that has no result in `out` yet, with the other workers of that folder.
 pub(crate) fn survey<T: Analysis>(
     runtime: &Handle,
     place: &Place,
     out: &Path,
-    threads: NonZeroUsize,
+    worker: &Worker,
     progress: &(dyn Fn(Now) + Sync),
-) -> anyhow::Result<Surveyed> {
+) -> anyhow::Result<Worked> {
     let files = runtime.block_on(place.files())?;
-    let now = Now {
-        files: 0,
-        files_all: files.len(),
-        bytes: 0,
-        bytes_all: files.iter().map(|file| file.size).sum(),
-    };
-    let state = Mutex::new((now, Surveyed::default(), None::<anyhow::Error>));
-    let failed = || state.lock().unwrap_or_else(PoisonError::into_inner).2.is_some();
-    for_each(threads, &files, |file| {
-        // Nothing more is begun after a failure.
-        if failed() {
-            return;
-        }
-        let done = one::<T>(runtime, place, out, file);
-        let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
-        let (now, surveyed, error) = &mut *state;
-        match done {
-            Ok(true) => surveyed.runs_analysed += 1,
-            Ok(false) => surveyed.runs_kept += 1,
-            Err(failed) => *error = Some(failed),
-        }
-        now.files += 1;
-        now.bytes += file.size;
-        progress(*now);
-    });
-    match state.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        (_, _, Some(error)) => Err(error),
-        (_, surveyed, None) => Ok(surveyed),
-    }
+    let survey = Survey { runtime, place, out, analysis: PhantomData::<fn() -> T> };
+    work(&survey, &files, worker, &|_, now| progress(now))
 }
 
-/// Analyses one run, unless its result is there; true if it did.
-fn one<T: Analysis>(runtime: &Handle, place: &Place, out: &Path, file: &ObjectMeta) -> anyhow::Result<bool> {
-    let path = result_path::<T>(out, place, file);
-    if read::<T>(&path)?.is_some_and(|known| known.bytes == file.size) {
-        return Ok(false);
+/// Folder of the claims of an analysis.
+pub(crate) fn claims<T: Analysis>(out: &Path) -> PathBuf {
+    out.join("claims").join(T::NAME)
+}
+
+/// The work on all runs.
+struct Survey<'a, T> {
+    runtime: &'a Handle,
+    place: &'a Place,
+    out: &'a Path,
+    analysis: PhantomData<fn() -> T>,
+}
+
+impl<T: Analysis> Work for Survey<'_, T> {
+    type Piece = ObjectMeta;
+    type Made = RunResult<T>;
+    type Error = anyhow::Error;
+
+    fn name(&self, file: &ObjectMeta) -> String {
+        self.place.in_fleet(&file.location).join("/")
     }
-    let head = runtime.block_on(RunHead::read(place, file))?;
-    let table = runtime.block_on(fetched(place, file)).with_context(|| file.location.to_string())?;
-    let result = RunResult {
-        schema: SCHEMA.to_owned(),
-        run: head.run,
-        rig: head.rig,
-        date: head.date,
-        started_ns: head.started_ns,
-        simulated: head.simulated,
-        bytes: file.size,
-        outcome: T::of(table.path()).map_or_else(Outcome::Refused, Outcome::Found),
-    };
-    write(&path, &result).with_context(|| path.display().to_string())?;
-    Ok(true)
+
+    fn size(&self, file: &ObjectMeta) -> u64 {
+        file.size
+    }
+
+    fn is_done(&self, file: &ObjectMeta) -> anyhow::Result<bool> {
+        let known = read::<T>(&result_path::<T>(self.out, self.place, file))?;
+        Ok(known.is_some_and(|known| known.bytes == file.size))
+    }
+
+    fn make(&self, file: &ObjectMeta, stop: &Stop) -> anyhow::Result<Option<RunResult<T>>> {
+        let head = self.runtime.block_on(RunHead::read(self.place, file))?;
+        let table = self.runtime.block_on(fetched(self.place, file));
+        let table = table.with_context(|| file.location.to_string())?;
+        let path = table.path().to_owned();
+        let Some(found) = stop.unless_set(move || T::of(&path)) else { return Ok(None) };
+        Ok(Some(RunResult {
+            schema: SCHEMA.to_owned(),
+            run: head.run,
+            rig: head.rig,
+            date: head.date,
+            started_ns: head.started_ns,
+            simulated: head.simulated,
+            bytes: file.size,
+            outcome: found.map_or_else(Outcome::Refused, Outcome::Found),
+        }))
+    }
+
+    fn keep(&self, file: &ObjectMeta, result: RunResult<T>) -> anyhow::Result<()> {
+        let path = result_path::<T>(self.out, self.place, file);
+        let text = serde_json::to_vec_pretty(&result)?;
+        write_whole(&path, &text).with_context(|| path.display().to_string())
+    }
 }
 
 /// Where the result of a run is: as its file in the fleet, in the folder of the analysis.
@@ -180,16 +180,6 @@ pub(crate) fn results<T: Analysis>(
         results.extend(read(&result_path::<T>(out, place, &file))?);
     }
     Ok(results)
-}
-
-/// Writes a result, which appears as a whole.
-fn write<T: Analysis>(path: &Path, result: &RunResult<T>) -> anyhow::Result<()> {
-    let folder = path.parent().context("a result has a folder")?;
-    fs::create_dir_all(folder)?;
-    let mut part = NamedTempFile::new_in(folder)?;
-    serde_json::to_writer_pretty(&mut part, result)?;
-    part.persist(path)?;
-    Ok(())
 }
 
 /// A run's file on the local disk, until it is dropped.

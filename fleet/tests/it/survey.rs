@@ -3,7 +3,9 @@
 
 use std::fs;
 
+use rustix::process::Signal;
 use serde_json::Value;
+use tactus_e2e::{Process, files, until};
 
 use crate::lab::{DAY_NS, Lab, NOON_NS};
 
@@ -65,4 +67,103 @@ fn runs_that_show_nothing_are_told_and_not_searched_again() {
     assert_eq!(told["runs_analysed"], 3);
     let again = survey(&lab, "discover");
     assert_eq!((&again["runs_analysed"], &again["refused"]), (&0.into(), &told["refused"]));
+}
+
+/// A worker that calibrates one run after the other.
+fn worker(lab: &Lab, more: &[&str]) -> Process {
+    let calibrate = ["--json", "--threads", "1", "calibrate", "--out", "shared"];
+    Process::start("tactus-fleet", &lab.path(""), &[&calibrate[..], more].concat())
+}
+
+/// Claims, as names of runs with the numbers of the claims.
+fn claims(lab: &Lab) -> Vec<String> {
+    files(&lab.path("shared/claims")).into_keys().map(|path| path.display().to_string()).collect()
+}
+
+/// Holds a worker while it has a run that is not done.
+fn hold_at_work(worker: &Process, lab: &Lab) {
+    let is_at_work = || {
+        let result = |claim: &String| lab.path("shared").join(claim.replace(".parquet.0", ".json"));
+        claims(lab).first().is_some_and(|claim| !result(claim).exists())
+    };
+    until("a worker that is held while it has a run", || {
+        // Only then, because a worker that is held again and again gets no further.
+        if !is_at_work() {
+            return None;
+        }
+        worker.hold();
+        if is_at_work() {
+            return Some(());
+        }
+        worker.signal(Signal::CONT);
+        None
+    });
+}
+
+fn told(worker: Process) -> Value {
+    let (code, said) = worker.wait();
+    assert_eq!(code, Some(0), "{said}");
+    serde_json::from_str(&said).unwrap()
+}
+
+#[test]
+fn two_workers_share_the_runs_and_find_what_one_finds() {
+    let lab = drifting();
+    let alone = survey(&lab, "calibrate");
+    let args = ["--lease-s", "3600"];
+    let first = worker(&lab, &args);
+    hold_at_work(&first, &lab);
+    let second = worker(&lab, &args);
+    until("all runs but one", || (files(&lab.path("shared/calibration")).len() == 9).then_some(()));
+    first.signal(Signal::CONT);
+    let [first, second] = [first, second].map(told);
+    let of = |told: &Value| {
+        ["runs_analysed", "runs_by_others", "runs_kept"].map(|name| told[name].as_u64().unwrap())
+    };
+    assert!(of(&first)[0] >= 1 && of(&second)[0] >= 1, "{first} {second}");
+    // Each run was done once.
+    assert_eq!(of(&first)[0] + of(&second)[0], 10);
+    for told in [&first, &second] {
+        assert_eq!(of(told).iter().sum::<u64>(), 10);
+        assert_eq!(told["drifts"], alone["drifts"]);
+    }
+    assert_eq!(files(&lab.path("shared/calibration")), files(&lab.path("survey/calibration")));
+    assert!(claims(&lab).is_empty());
+}
+
+#[test]
+fn the_run_of_a_killed_worker_is_taken_over() {
+    let lab = drifting();
+    survey(&lab, "calibrate");
+    let args = ["--lease-s", "1"];
+    let mut first = worker(&lab, &args);
+    hold_at_work(&first, &lab);
+    first.kill();
+    let done = files(&lab.path("shared/calibration")).len();
+    let second = told(worker(&lab, &args));
+    assert_eq!((&second["runs_analysed"], &second["runs_kept"]), (&(10 - done).into(), &done.into()));
+    assert_eq!(files(&lab.path("shared/calibration")), files(&lab.path("survey/calibration")));
+    assert!(claims(&lab).is_empty());
+}
+
+#[test]
+fn a_stopped_survey_leaves_nothing_half_done_and_the_next_goes_on() {
+    let lab = drifting();
+    survey(&lab, "calibrate");
+    let first = worker(&lab, &[]);
+    hold_at_work(&first, &lab);
+    first.signal(Signal::TERM);
+    first.signal(Signal::CONT);
+    let (code, said) = first.wait();
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("not done: the same command goes on"), "{said}");
+    assert!(claims(&lab).is_empty());
+    let done = files(&lab.path("shared/calibration"));
+    assert!(
+        done.keys().all(|path| path.extension().is_some_and(|extension| extension == "json")),
+        "{done:?}"
+    );
+    let second = told(worker(&lab, &[]));
+    assert_eq!(second["runs_kept"], done.len());
+    assert_eq!(files(&lab.path("shared/calibration")), files(&lab.path("survey/calibration")));
 }
