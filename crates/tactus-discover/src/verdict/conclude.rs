@@ -146,8 +146,7 @@ pub(crate) fn conclude(
     let evidence = Evidence {
         is_named: named || lattice.is_some() || !faulty.effects.is_empty(),
         is_missing: options.rule == Rule::Protocol && (p_value <= ALPHA || has_refused(&contests)),
-        is_left,
-        is_worse: closed.is_some_and(|closed| closed.share < 0.0),
+        is_left: is_left || closed.is_some_and(|closed| closed.share < 0.0),
         upper_noise,
         tolerance_noise: options
             .tolerance_counts
@@ -157,7 +156,7 @@ pub(crate) fn conclude(
     let verdict = evidence.verdict();
     let given_up = given_up(exchanged, &contests, &tentative, &steps);
     let leaves = Leaves { verdict, is_left, grown: &grown, of_grown: &of_grown, given_up: &given_up };
-    let Drafting { draft, model: with_draft } = drafted(prepared, search, leaves, floor)?;
+    let Drafting { draft, model: with_draft } = drafted(prepared, search, &leaves, floor)?;
     let noise_counts = floor.rms_counts().unwrap_or(0.0);
     let levels = [base_level, grown_level].map(|level| level.heldout_rms_counts);
     let staircase = search.staircase(&grown, levels, &steps, draft.as_ref())?;
@@ -343,10 +342,8 @@ struct Evidence {
     is_named: bool,
     /// A test rejects the base model.
     is_missing: bool,
-    /// A test rejects the grown model.
+    /// A test rejects the grown model, or it is further from the held-out presses than the base model.
     is_left: bool,
-    /// The grown model is further from the held-out presses than the base model.
-    is_worse: bool,
     /// Upper bound of what is structured in the grown model's residual.
     upper_noise: f64,
     /// The tolerance that was declared beforehand; 0 if none was.
@@ -362,7 +359,7 @@ impl Evidence {
             // No test rejects, but there may be more than one would overlook.
             (false, false) => Verdict::CannotJudge,
             (false, true) => Verdict::Unexplained,
-            (true, _) if is_little || is_seen && !self.is_left && !self.is_worse => Verdict::Explained,
+            (true, _) if is_little || is_seen && !self.is_left => Verdict::Explained,
             (true, _) => Verdict::PartlyExplained,
         }
     }

@@ -20,7 +20,6 @@ const NAMED: Evidence = Evidence {
 fn names_explain_if_no_test_rejects_and_less_than_twice_the_noise_is_left() {
     assert_eq!(NAMED.verdict(), Verdict::Explained);
     assert_eq!(Evidence { is_left: true, ..NAMED }.verdict(), Verdict::PartlyExplained);
-    assert_eq!(Evidence { is_worse: true, ..NAMED }.verdict(), Verdict::PartlyExplained);
     assert_eq!(Evidence { upper_noise: 2.1, ..NAMED }.verdict(), Verdict::PartlyExplained);
     assert_eq!(Evidence { is_left: true, upper_noise: 0.4, ..NAMED }.verdict(), Verdict::Explained);
     let tolerable = Evidence { is_left: true, upper_noise: 30.0, tolerance_noise: 31.0, ..NAMED };

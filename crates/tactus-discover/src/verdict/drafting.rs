@@ -73,10 +73,10 @@ pub(super) struct Leaves<'a> {
 pub(super) fn drafted(
     prepared: &Prepared<'_>,
     search: &Search<'_>,
-    leaves: Leaves<'_>,
+    leaves: &Leaves<'_>,
     floor: Floor,
 ) -> Result<Drafting, DiscoverError> {
-    let Leaves { verdict, is_left, grown, of_grown, given_up } = leaves;
+    let Leaves { verdict, is_left, grown, of_grown, given_up } = *leaves;
     let is_open = match verdict {
         Verdict::Unexplained | Verdict::PartlyExplained => true,
         Verdict::Explained => is_left,
