@@ -7,14 +7,8 @@ use crate::fixtures::{ELEMENTS, ShippedRig, found, known, measured, processes};
 use crate::{Floor, Frames, discover};
 
 /// Effects were named, a test rejects the base model, and none the grown one.
-const NAMED: Evidence = Evidence {
-    is_named: true,
-    is_missing: true,
-    is_left: false,
-    is_worse: false,
-    upper_noise: 1.9,
-    tolerance_noise: 0.0,
-};
+const NAMED: Evidence =
+    Evidence { is_named: true, is_missing: true, is_left: false, upper_noise: 1.9, tolerance_noise: 0.0 };
 
 #[test]
 fn names_explain_if_no_test_rejects_and_less_than_twice_the_noise_is_left() {
