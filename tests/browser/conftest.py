@@ -48,7 +48,7 @@ def open_page(web, browser):
     pages = []
     PICTURES.mkdir(parents=True, exist_ok=True)
     # The console also reports a command that the service refuses as an error.
-    refused = re.compile("the server responded with a status of (409|423)")
+    refused = re.compile("the server responded with a status of (409|423|503)")
 
     def open_page(go=True, viewport=None, **options):
         page = browser.new_page(viewport=viewport or {"width": 1400, "height": 900}, **options)

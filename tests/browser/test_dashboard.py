@@ -211,6 +211,23 @@ def test_the_colour_bar_is_free_or_fixed_in_counts_or_share(lab, dashboard):
     expect(bar).to_have_attribute("aria-label", "Colour bar from 0 to 40.0 % of the limit")
 
 
+def test_a_dry_run_that_a_newer_one_ended_is_asked_for_again(lab, dashboard):
+    page = loaded(dashboard)
+    asked = []
+
+    def ended_once(route):
+        asked.append(route.request)
+        if len(asked) == 1:
+            route.fulfill(status=503, body="a newer dry run has ended this one")
+        else:
+            route.continue_()
+
+    page.route("**/plan", ended_once)
+    page.select_option("#experiment", "image")
+    expect(page.locator("#verdict.possible")).to_contain_text("4, 4 dwells", timeout=PATIENCE_MS)
+    assert len(asked) == 2
+
+
 def test_an_experiment_is_chosen_checked_and_started(lab, dashboard):
     page = loaded(dashboard)
     page.select_option("#experiment", "image")

@@ -82,8 +82,7 @@ def test_a_run_is_reported_and_taken_along(shelf, two_runs):
 
 
 def test_a_run_is_made_again(lab, shelf, two_runs):
-    page, (_, second) = shelf, two_runs
-    before = page.locator("tr.run").count()
+    page, (first, second) = shelf, two_runs
     row(page, second).locator(".name").click()
     page.locator(".again").click()
     expect(page.locator(".details")).to_contain_text(re.compile("again .*: done"), timeout=PATIENCE_MS)
@@ -91,8 +90,11 @@ def test_a_run_is_made_again(lab, shelf, two_runs):
     expect(page.locator("#run")).to_contain_text("finished: done", timeout=PATIENCE_MS)
     page.locator("#to-runs").click()
     page.locator("#words").fill("few")
-    expect(page.locator("tr.run")).to_have_count(before + 1)
-    again = page.locator("tr.run").first.get_attribute("data-run")
+    # The newest is the first.
+    newest = page.locator("tr.run").first
+    expect(newest).not_to_have_attribute("data-run", re.compile(f"{first}|{second}"), timeout=PATIENCE_MS)
+    expect(newest).to_have_attribute("data-run", re.compile("-few-"))
+    again = newest.get_attribute("data-run")
     compared = tactus("runs", "compare", second, again, "--runs", lab.folder / "runs")
     assert compared["same"]["-p count"] == ["2", "2"] and "seed" in compared["same"]
 

@@ -11,6 +11,9 @@ const form = { experiments: null, error: "", name: "", texts: {}, seed: "", who:
 const check = { key: "", state: "none", plan: null, message: "", stop: null };
 const NUMBERS = ["int", "float"];
 const LISTS = ["list-of-int", "list-of-float"];
+/** Who plans at two dashboards at once ends the other's dry run each time. */
+const ATTEMPTS = 4;
+const NOT_NOW = 503;
 
 /** What a field shows of a value. */
 function asText(value) {
@@ -60,7 +63,18 @@ async function loadExperiments(draw) {
   draw();
 }
 
-/** Asks the service for a dry run; an older one is given up. */
+/** Asks the service for a dry run. A newer one ends it, also one that was asked for before and comes later, or somebody else's: then it is asked for again. */
+async function dryRun(body, signal) {
+  for (let left = ATTEMPTS; ; left -= 1) {
+    try {
+      return JSON.parse(await ask("plan", body, { patience_s: 310, signal }));
+    } catch (error) {
+      if (error.status !== NOT_NOW || left === 1) throw error;
+    }
+  }
+}
+
+/** Keeps the dry run of the form; an older one is given up. */
 async function plan(draw) {
   check.stop?.abort();
   const { given, wrong } = values();
@@ -74,7 +88,7 @@ async function plan(draw) {
   draw();
   try {
     const body = { experiment: form.name, parameters: given, seed: form.seed };
-    const found = JSON.parse(await ask("plan", body, { patience_s: 310, signal: stop.signal }));
+    const found = await dryRun(body, stop.signal);
     if (check.stop === stop) Object.assign(check, { state: "done", plan: found });
   } catch (error) {
     if (check.stop === stop) Object.assign(check, { state: "failed", message: error.message });

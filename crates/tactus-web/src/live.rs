@@ -30,6 +30,8 @@ const DRY_RUN_PATIENCE: Duration = Duration::from_mins(5);
 const STOP_PATIENCE: Duration = Duration::from_secs(5);
 /// Time between two views of what is no frame.
 const VIEW_PERIOD: Duration = Duration::from_millis(100);
+/// `CommandReply.exit_code` of what cannot be done in this state.
+const NOT_NOW: u32 = 5;
 /// This program's name for the service.
 const WHO: &str = "dashboard";
 
@@ -38,6 +40,8 @@ const WHO: &str = "dashboard";
 pub(crate) enum NotDone {
     /// Another client holds the lease.
     Held(String),
+    /// A question that may be answered if it is asked again.
+    NotNow(String),
     /// Any other reason.
     Failed(String),
 }
@@ -230,7 +234,8 @@ impl Live {
             }
         };
         let reply = reply.map_err(|error| NotDone::Failed(in_words(error)))?;
-        done(&reply).map_err(NotDone::Failed)?;
+        let why = if reply.exit_code == NOT_NOW { NotDone::NotNow } else { NotDone::Failed };
+        done(&reply).map_err(why)?;
         Ok(match &reply.plan {
             Some(plan) => plan_json(plan),
             None => reply.experiments.iter().map(experiment_json).collect(),

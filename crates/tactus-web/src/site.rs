@@ -286,6 +286,7 @@ fn answer(answer: Result<Value, NotDone>) -> Response {
 fn refused(refusal: NotDone) -> Response {
     match refusal {
         NotDone::Held(error) => (StatusCode::LOCKED, error).into_response(),
+        NotDone::NotNow(error) => (StatusCode::SERVICE_UNAVAILABLE, error).into_response(),
         NotDone::Failed(error) => (StatusCode::CONFLICT, error).into_response(),
     }
 }
