@@ -10,7 +10,7 @@ use std::{
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{Process, binary, computed, files, until};
+use tactus_e2e::{Process, binary, computed, files};
 use tempfile::TempDir;
 
 /// Sets of [`evidence`].
@@ -52,18 +52,7 @@ fn hold_at_work(worker: &Process, folder: &Path, name: &str) {
     let ran = folder.join(name).join("work/ran");
     let is_at_work =
         || claims(folder, name).first().is_some_and(|claim| !ran.join(claim.with_extension("json")).exists());
-    until("a worker that is held while it has a set", || {
-        // Only then, because a worker that is held again and again gets no further.
-        if !is_at_work() {
-            return None;
-        }
-        worker.hold();
-        if is_at_work() {
-            return Some(());
-        }
-        worker.signal(Signal::CONT);
-        None
-    });
+    worker.hold_when("a worker that is held while it has a set", is_at_work);
 }
 
 /// The numbers of `sets: 3 done, 5 by other workers, 0 before`.

@@ -376,6 +376,25 @@ impl Process {
         assert!(status.is_some_and(|(_, status)| status.stopped()), "{} has ended: {status:?}", self.name);
     }
 
+    /// [Holds](Self::hold) it at a moment of which this is true.
+    ///
+    /// # Panics
+    /// If no such moment comes before the deadline.
+    pub fn hold_when(&self, what: &str, is_so: impl Fn() -> bool) {
+        until(what, || {
+            // Only then, because a process that is held again and again gets no further.
+            if !is_so() {
+                return None;
+            }
+            self.hold();
+            if is_so() {
+                return Some(());
+            }
+            self.signal(Signal::CONT);
+            None
+        });
+    }
+
     /// Kills it, and returns when it is gone with all that it held: a port that it listened on is free again.
     ///
     /// # Panics

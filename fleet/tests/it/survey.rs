@@ -86,18 +86,7 @@ fn hold_at_work(worker: &Process, lab: &Lab) {
         let result = |claim: &String| lab.path("shared").join(claim.replace(".parquet.0", ".json"));
         claims(lab).first().is_some_and(|claim| !result(claim).exists())
     };
-    until("a worker that is held while it has a run", || {
-        // Only then, because a worker that is held again and again gets no further.
-        if !is_at_work() {
-            return None;
-        }
-        worker.hold();
-        if is_at_work() {
-            return Some(());
-        }
-        worker.signal(Signal::CONT);
-        None
-    });
+    worker.hold_when("a worker that is held while it has a run", is_at_work);
 }
 
 fn told(worker: Process) -> Value {

@@ -142,10 +142,11 @@ pub(crate) fn conclude(
     let floor = prepared.floor_of(&of_grown);
     let [base_level, grown_level] = [&of_base, &of_grown].map(|held| prepared.level(held, floor));
     let upper_noise = grown_level.structured.map_or(f64::INFINITY, |part| part.upper_noise);
-    let closed = prepared.closed([&of_base, &of_grown], &grown, floor)?.filter(|_| p_value <= ALPHA);
+    let has_gap = p_value <= ALPHA;
+    let closed = if has_gap { prepared.closed([&of_base, &of_grown], &grown, floor)? } else { None };
     let evidence = Evidence {
         is_named: named || lattice.is_some() || !faulty.effects.is_empty(),
-        is_missing: options.rule == Rule::Protocol && (p_value <= ALPHA || has_refused(&contests)),
+        is_missing: options.rule == Rule::Protocol && (has_gap || has_refused(&contests)),
         is_left: is_left || closed.is_some_and(|closed| closed.share < 0.0),
         upper_noise,
         tolerance_noise: options
