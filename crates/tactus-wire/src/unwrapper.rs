@@ -3,7 +3,8 @@
 /// Unwraps a number that starts again at 0 after `modulus` steps.
 #[derive(Debug, Clone)]
 pub(crate) struct Unwrapper {
-    modulus: u128,
+    /// The number before it starts again at 0.
+    greatest: u64,
     last: Option<Previous>,
 }
 
@@ -37,19 +38,19 @@ impl Advance {
 impl Unwrapper {
     /// An unwrapper for numbers below `modulus`, which is 2 to 2^64.
     pub(crate) fn new(modulus: u128) -> Self {
-        Self { modulus: modulus.clamp(2, 1 << 64), last: None }
+        Self { greatest: u64::try_from(modulus.clamp(2, 1 << 64) - 1).unwrap_or(u64::MAX), last: None }
     }
 
     /// Takes the next number, modulo the modulus.
     pub(crate) fn advance(&mut self, raw: u64) -> Advance {
-        let raw = narrow(u128::from(raw) % self.modulus);
+        let raw = if raw <= self.greatest { raw } else { raw % (self.greatest + 1) };
         let step = match self.last {
             None => Advance::Anew { total: raw },
             Some(last) if last.raw == raw => Advance::Same { total: last.total },
             Some(last) => {
-                let ahead = (u128::from(raw) + self.modulus - u128::from(last.raw)) % self.modulus;
-                if ahead <= self.modulus / 2 {
-                    Advance::Ahead { by: narrow(ahead), total: last.total.saturating_add(narrow(ahead)) }
+                let by = if raw > last.raw { raw - last.raw } else { self.greatest - last.raw + raw + 1 };
+                if by <= self.greatest.div_ceil(2) {
+                    Advance::Ahead { by, total: last.total.saturating_add(by) }
                 } else {
                     Advance::Anew { total: raw }
                 }
@@ -58,10 +59,6 @@ impl Unwrapper {
         self.last = Some(Previous { raw, total: step.total() });
         step
     }
-}
-
-fn narrow(number: u128) -> u64 {
-    u64::try_from(number).unwrap_or(u64::MAX)
 }
 
 #[cfg(test)]

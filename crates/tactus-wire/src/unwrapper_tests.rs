@@ -45,4 +45,26 @@ proptest! {
             prop_assert_eq!(wrapping.advance(sum % modulus).total(), sum);
         }
     }
+
+    #[test]
+    fn a_step_is_the_shorter_way_round(
+        modulus in prop_oneof![2..300u128, 2..=1u128 << 64, Just(1 << 64)],
+        before: u64,
+        after: u64,
+    ) {
+        let [before, after] = [before, after].map(|raw| u128::from(raw) % modulus);
+        let raw = [before, after].map(|raw| u64::try_from(raw).unwrap());
+        let by = u64::try_from((after + modulus - before) % modulus).unwrap();
+        let expected = match by {
+            0 => Advance::Same { total: raw[0] },
+            _ if u128::from(by) > modulus / 2 => Advance::Anew { total: raw[1] },
+            _ => Advance::Ahead { by, total: raw[0].saturating_add(by) },
+        };
+        prop_assert_eq!(steps(modulus, &raw)[1], expected);
+    }
+
+    #[test]
+    fn numbers_are_taken_modulo_the_modulus(modulus in 2..300u64, number: u64) {
+        prop_assert_eq!(steps(modulus.into(), &[number]), [Advance::Anew { total: number % modulus }]);
+    }
 }

@@ -103,12 +103,17 @@ pub const CRC32: CrcParameters = CrcParameters {
     xorout: 0xFFFF_FFFF,
 };
 
+/// Greatest number of bytes that are looked up together.
+const BLOCK_BYTES: usize = 16;
+
+/// Entry `[k][b]` is the check, from 0 on, of byte `b` followed by `k` zero bytes.
+type Tables = [[u32; 256]; BLOCK_BYTES];
+
 /// A cyclic redundancy check with its tables. Clones share the tables.
 #[derive(Clone)]
 pub struct Crc {
     parameters: CrcParameters,
-    /// Tables for eight bytes at a time: entry `[k][b]` is byte `b` followed by `k` zero bytes.
-    tables: Arc<[[u32; 256]; 8]>,
+    tables: Arc<Tables>,
 }
 
 impl Crc {
@@ -128,55 +133,34 @@ impl Crc {
         let CrcParameters { width, init, reflect, xorout, .. } = self.parameters;
         let top = init << width.above();
         let result = if reflect {
-            self.lowest_first(top.reverse_bits(), bytes)
+            self.update(top.reverse_bits(), bytes, u32::to_le_bytes, |crc| crc >> 8)
         } else {
-            self.highest_first(top, bytes)
+            self.update(top, bytes, u32::to_be_bytes, |crc| crc << 8)
         };
         let result = if reflect { result } else { result >> width.above() };
         result ^ xorout
     }
 
-    fn lowest_first(&self, mut crc: u32, bytes: &[u8]) -> u32 {
-        let (eights, rest) = bytes.as_chunks::<8>();
-        // The update is linear over exclusive or, so the bytes of a block can be looked up independently.
-        for &[b0, b1, b2, b3, b4, b5, b6, b7] in eights {
-            let [c0, c1, c2, c3] = crc.to_le_bytes();
-            crc = self.block([b0 ^ c0, b1 ^ c1, b2 ^ c2, b3 ^ c3, b4, b5, b6, b7]);
-        }
-        for byte in rest {
-            let [lowest, ..] = crc.to_le_bytes();
-            crc = (crc >> 8) ^ self.at(0, lowest ^ byte);
-        }
-        crc
+    /// Continues `crc` over `bytes`. `split` gives the bytes of a check, the one that is due first in front; `shift` drops that one.
+    fn update(&self, crc: u32, bytes: &[u8], split: fn(u32) -> [u8; 4], shift: fn(u32) -> u32) -> u32 {
+        let (blocks, rest) = bytes.as_chunks::<BLOCK_BYTES>();
+        let (fours, rest) = rest.as_chunks::<4>();
+        let crc = blocks.iter().fold(crc, |crc, block| self.block(split(crc), block));
+        let crc = fours.iter().fold(crc, |crc, block| self.block(split(crc), block));
+        rest.iter().fold(crc, |crc, byte| shift(crc) ^ self.block(split(crc), &[*byte]))
     }
 
-    fn highest_first(&self, mut crc: u32, bytes: &[u8]) -> u32 {
-        let (eights, rest) = bytes.as_chunks::<8>();
-        for &[b0, b1, b2, b3, b4, b5, b6, b7] in eights {
-            let [c0, c1, c2, c3] = crc.to_be_bytes();
-            crc = self.block([b0 ^ c0, b1 ^ c1, b2 ^ c2, b3 ^ c3, b4, b5, b6, b7]);
-        }
-        for byte in rest {
-            let [highest, ..] = crc.to_be_bytes();
-            crc = (crc << 8) ^ self.at(0, highest ^ byte);
-        }
-        crc
-    }
-
-    fn block(&self, [b0, b1, b2, b3, b4, b5, b6, b7]: [u8; 8]) -> u32 {
-        self.at(7, b0)
-            ^ self.at(6, b1)
-            ^ self.at(5, b2)
-            ^ self.at(4, b3)
-            ^ self.at(3, b4)
-            ^ self.at(2, b5)
-            ^ self.at(1, b6)
-            ^ self.at(0, b7)
-    }
-
-    #[expect(clippy::indexing_slicing, reason = "tables are 0 to 7; a byte is an index into a table of 256")]
-    fn at(&self, table: usize, byte: u8) -> u32 {
-        self.tables[table][usize::from(byte)]
+    /// The check of a block, from the bytes of the check before on. The check is linear over exclusive or, so each byte is looked
+    /// up for itself. Only the first four of them wait for the block before; they come last.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "a byte is an index into a table of 256; no block is longer than the tables"
+    )]
+    fn block<const BYTES: usize>(&self, before: [u8; 4], block: &[u8; BYTES]) -> u32 {
+        block.iter().enumerate().rev().fold(0, |crc, (at, byte)| {
+            let before = before.get(at).copied().unwrap_or_default();
+            crc ^ self.tables[BYTES - 1 - at][usize::from(byte ^ before)]
+        })
     }
 }
 
@@ -194,7 +178,7 @@ impl fmt::Debug for Crc {
     }
 }
 
-fn tables(CrcParameters { width, polynomial, reflect, .. }: CrcParameters) -> [[u32; 256]; 8] {
+fn tables(CrcParameters { width, polynomial, reflect, .. }: CrcParameters) -> Tables {
     let polynomial = polynomial << width.above();
     // One byte and then `zeros` zero bytes, bit by bit.
     let entry = |byte: u32, zeros: usize| {

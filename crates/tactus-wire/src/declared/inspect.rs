@@ -34,7 +34,8 @@ impl Format {
             }
         }
         let Some(frame) = bytes.get(..self.bytes) else { return FrameCandidate::Unfinished };
-        if !frame.ends_with(&self.trailer) {
+        let end = frame.get(self.bytes - self.trailer.len()..).unwrap_or_default();
+        if !begins_like(end, &self.trailer) {
             return FrameCandidate::BadTrailer;
         }
         if let Some(checksum) = &self.checksum {

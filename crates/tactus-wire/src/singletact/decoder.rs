@@ -79,7 +79,7 @@ impl Decoder {
         self.stats
     }
 
-    fn next_packet(&mut self, extent: fn(&[u8]) -> Extent) -> Option<Range<usize>> {
+    fn next_packet(&mut self, extent: impl Fn(&[u8]) -> Extent) -> Option<Range<usize>> {
         loop {
             self.skip_to_header();
             let outer_at = self.start;
@@ -91,7 +91,7 @@ impl Decoder {
                 Extent::Unfinished => (self.bytes.len() + 1, None),
                 Extent::Whole { length } => (outer_at + length, Some(outer_at..outer_at + length)),
             };
-            let packet = self.first_to_end_within(outer_at + 1, limit, extent).or(whole)?;
+            let packet = self.first_to_end_within(outer_at + 1, limit, &extent).or(whole)?;
             self.skip(packet.start - outer_at);
             self.start = packet.end;
             return Some(packet);
@@ -104,7 +104,7 @@ impl Decoder {
         &self,
         from: usize,
         mut limit: usize,
-        extent: fn(&[u8]) -> Extent,
+        extent: impl Fn(&[u8]) -> Extent,
     ) -> Option<Range<usize>> {
         let mut first = None;
         let mut at = from;
@@ -141,9 +141,16 @@ impl Decoder {
 /// Length of a read request without the zero behind it. No other request is that short.
 const READ_BYTES: usize = 15;
 
-/// Offset of the first four header bytes in a row, of either board.
+/// Offset of the first four header bytes in a row, of either board. Wherever they begin, one of them is the last byte of a chunk
+/// of four, so that most chunks are passed by a look at one byte.
 fn find_header(bytes: &[u8]) -> Option<usize> {
-    bytes.array_windows().position(|four| *four == [HEADER; 4] || *four == [USB_HEADER; 4])
+    let (chunks, _) = bytes.as_chunks::<4>();
+    let touched = |(_, chunk): &(usize, &[u8; 4])| [HEADER, USB_HEADER].contains(&chunk[3]);
+    chunks.iter().enumerate().filter(touched).find_map(|(chunk, _)| {
+        let mut begins = bytes.get(4 * chunk..)?.array_windows().take(4);
+        let offset = begins.position(|four| *four == [HEADER; 4] || *four == [USB_HEADER; 4])?;
+        Some(4 * chunk + offset)
+    })
 }
 
 #[cfg(test)]

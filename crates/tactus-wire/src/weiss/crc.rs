@@ -1,7 +1,10 @@
 //! The checksum.
 
-/// Tables for eight bytes at a time: entry `[k][b]` is byte `b` followed by `k` zero bytes.
-static TABLES: [[u16; 256]; 8] = tables();
+/// Greatest number of bytes that are looked up together.
+const BLOCK_BYTES: usize = 16;
+
+/// Entry `[k][b]` is the checksum, from 0 on, of byte `b` followed by `k` zero bytes.
+static TABLES: [[u16; 256]; BLOCK_BYTES] = tables();
 
 /// The checksum of `bytes`, with the initial value 0xFFFF.
 ///
@@ -13,32 +16,35 @@ pub fn crc(bytes: &[u8]) -> u16 {
 }
 
 /// Continues the checksum `crc` over `bytes`.
-#[expect(clippy::indexing_slicing, reason = "a byte is an index into a table of 256")]
-pub(super) fn update(mut crc: u16, bytes: &[u8]) -> u16 {
-    let at = |table: usize, byte: u8| TABLES[table][usize::from(byte)];
-    let (eights, rest) = bytes.as_chunks::<8>();
-    // The update is linear over xor, so the bytes of a block can be looked up independently.
-    for &[b0, b1, b2, b3, b4, b5, b6, b7] in eights {
-        let [low, high] = crc.to_le_bytes();
-        crc = at(7, b0 ^ low)
-            ^ at(6, b1 ^ high)
-            ^ at(5, b2)
-            ^ at(4, b3)
-            ^ at(3, b4)
-            ^ at(2, b5)
-            ^ at(1, b6)
-            ^ at(0, b7);
-    }
-    for &byte in rest {
-        let [low, high] = crc.to_le_bytes();
-        crc = u16::from(high) ^ at(0, byte ^ low);
-    }
-    crc
+pub(super) fn update(crc: u16, bytes: &[u8]) -> u16 {
+    let (blocks, rest) = bytes.as_chunks::<BLOCK_BYTES>();
+    let (fours, rest) = rest.as_chunks::<4>();
+    let crc = blocks.iter().fold(crc, update_block);
+    let crc = fours.iter().fold(crc, update_block);
+    rest.iter().fold(crc, |crc, byte| crc >> 8 ^ update_block(crc & 0xFF, &[*byte]))
+}
+
+/// Continues over a block. The update is linear over xor, so each byte is looked up for itself. Only the first two of them wait
+/// for the block before; they come last.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "a byte is an index into a table of 256; no block is longer than the tables"
+)]
+fn update_block<const BYTES: usize>(crc: u16, block: &[u8; BYTES]) -> u16 {
+    let [low, high] = crc.to_le_bytes();
+    block.iter().enumerate().rev().fold(0, |crc, (at, byte)| {
+        let before = match at {
+            0 => low,
+            1 => high,
+            _ => 0,
+        };
+        crc ^ TABLES[BYTES - 1 - at][usize::from(byte ^ before)]
+    })
 }
 
 #[expect(clippy::indexing_slicing, reason = "constant bounds, evaluated by the compiler")]
-const fn tables() -> [[u16; 256]; 8] {
-    let mut tables = [[0; 256]; 8];
+const fn tables() -> [[u16; 256]; BLOCK_BYTES] {
+    let mut tables = [[0; 256]; BLOCK_BYTES];
     let mut byte = 0;
     while byte < 256 {
         #[expect(clippy::cast_possible_truncation, reason = "below 256")]
@@ -52,7 +58,7 @@ const fn tables() -> [[u16; 256]; 8] {
         byte += 1;
     }
     let mut zeros = 1;
-    while zeros < 8 {
+    while zeros < BLOCK_BYTES {
         let mut byte = 0;
         while byte < 256 {
             let before = tables[zeros - 1][byte];

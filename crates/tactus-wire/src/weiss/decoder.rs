@@ -113,7 +113,8 @@ impl Decoder {
                 PacketCandidate::Unfinished => (self.bytes.len() + 1, None),
                 PacketCandidate::Whole { end, verdict } => (end, Some(verdict)),
             };
-            if let Some(inner) = self.first_to_end_within(outer_at + 1, limit) {
+            // The id behind the sync bytes is no sync byte, so that no other packet begins before it.
+            if let Some(inner) = self.first_to_end_within(outer_at + SYNC.len() + 1, limit) {
                 self.skip(inner.start - outer_at);
                 return self.accept(inner.end).map(Ok);
             }
@@ -136,6 +137,9 @@ impl Decoder {
     /// Skips to the next sync bytes; without any, to the end except for what may become sync bytes.
     fn skip_to_sync(&mut self) {
         let rest = self.bytes.get(self.start..).unwrap_or_default();
+        if rest.starts_with(&SYNC) {
+            return;
+        }
         let skipped = find_sync(rest).unwrap_or_else(|| {
             let begun = rest.iter().rev().take(SYNC.len() - 1).take_while(|byte| **byte == SYNC[0]).count();
             rest.len() - begun
@@ -236,10 +240,14 @@ fn find_sync(bytes: &[u8]) -> Option<usize> {
 
 /// Offset of the first sync byte. It compares blocks, which the compiler vectorises.
 fn find_sync_byte(bytes: &[u8]) -> Option<usize> {
-    let (blocks, _) = bytes.as_chunks::<32>();
+    let (blocks, rest) = bytes.as_chunks::<32>();
     let has_none =
         |block: &&[u8; 32]| block.iter().fold(0, |any, byte| any | u8::from(*byte == SYNC[0])) == 0;
     let without = 32 * blocks.iter().take_while(has_none).count();
+    // The rest is the end of a block that overlaps the one before.
+    if without + rest.len() == bytes.len() && bytes.last_chunk().as_ref().is_some_and(has_none) {
+        return None;
+    }
     let rest = bytes.get(without..)?;
     rest.iter().position(|byte| *byte == SYNC[0]).map(|offset| without + offset)
 }

@@ -8,6 +8,9 @@ const RUN_LENGTH: u8 = 0x01;
 /// Greatest count in a run-length word.
 const MAX_RUN_COUNTS: u16 = 0x0FFF;
 
+/// At least the greatest number of counts in a run, which is 15.
+const RUN_ROOM: usize = 16;
+
 /// One reading of all elements.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DecodedFrame {
@@ -39,9 +42,10 @@ impl DecodedFrame {
     ///
     /// # Errors
     /// If it is another packet, is damaged, or has another number of elements.
+    #[inline]
     pub fn parse(packet: &Packet<'_>, elements: usize) -> Result<Self, FrameError> {
         let frame = PackedFrame::parse(packet, elements)?;
-        let counts = if frame.run_length { frame.runs().collect() } else { frame.words().collect() };
+        let counts = if frame.run_length { frame.unpack(elements) } else { frame.words().collect() };
         Ok(Self { timestamp_ms: frame.timestamp_ms, run_length: frame.run_length, counts })
     }
 }
@@ -70,36 +74,48 @@ impl<'a> PackedFrame<'a> {
         let (texels, []) = texels.as_chunks::<2>() else { return Err(length) };
         let run_length = flags & RUN_LENGTH != 0;
         let frame = Self { timestamp_ms: u32::from_le_bytes(*timestamp), run_length, texels };
-        let found = if run_length { frame.words().map(repeats).sum() } else { texels.len() };
+        let found = if run_length { frame.words().map(repeats).sum::<u32>() as usize } else { texels.len() };
         if found == elements { Ok(frame) } else { Err(FrameError::Elements { expected: elements, found }) }
     }
 
     /// Writes the counts into `counts`, of which there is one for each element.
     pub(crate) fn write_to(self, counts: &mut [f32]) {
-        if self.run_length {
-            write(self.runs(), counts);
-        } else {
-            write(self.words(), counts);
+        if !self.run_length {
+            for (count, word) in counts.iter_mut().zip(self.words()) {
+                *count = word.into();
+            }
+            return;
         }
+        let mut rest = counts;
+        for word in self.words() {
+            let Some((run, later)) = rest.split_at_mut_checked(repeats(word) as usize) else { return };
+            run.fill((word & MAX_RUN_COUNTS).into());
+            rest = later;
+        }
+    }
+
+    /// The counts of a run-length frame.
+    fn unpack(self, elements: usize) -> Vec<u16> {
+        // Not zeros, which cost more memory management than their length.
+        let mut counts = vec![MAX_RUN_COUNTS; elements + RUN_ROOM];
+        let mut at = 0;
+        for word in self.words() {
+            // More than the run has, because a fixed number costs less than the right one.
+            let Some(room) = counts.get_mut(at..).and_then(<[u16]>::first_chunk_mut) else { break };
+            *room = [word & MAX_RUN_COUNTS; RUN_ROOM];
+            at += repeats(word) as usize;
+        }
+        counts.truncate(elements);
+        counts
     }
 
     fn words(self) -> impl Iterator<Item = u16> + 'a {
         self.texels.iter().map(|word| u16::from_le_bytes(*word))
     }
-
-    fn runs(self) -> impl Iterator<Item = u16> + 'a {
-        self.words().flat_map(|word| std::iter::repeat_n(word & MAX_RUN_COUNTS, repeats(word)))
-    }
 }
 
-fn repeats(word: u16) -> usize {
-    usize::from(word >> 12)
-}
-
-fn write(from: impl Iterator<Item = u16>, counts: &mut [f32]) {
-    for (count, read) in counts.iter_mut().zip(from) {
-        *count = f32::from(read);
-    }
+fn repeats(word: u16) -> u32 {
+    u32::from(word >> 12)
 }
 
 /// Encodes a frame as a packet.
