@@ -149,7 +149,8 @@ pub(crate) async fn acquire(
         acquisition.publish_fault();
         let next_look = clock.instant(acquisition.looked.after(acquisition.look_period));
         if timer.deadline() != next_look {
-            timer.as_mut().reset(next_look);
+            // A new one: a timer that is reset to a later time still wakes the runtime at the earlier one.
+            timer.set(sleep_until(next_look));
         }
         // A panic of the driver's, or of what handles its frames, must neither end the supervision nor go unnoticed.
         let next = AssertUnwindSafe(poll_fn(|context| sensor.poll_next(context))).catch_unwind();
