@@ -24,7 +24,9 @@ use crate::data::DiscoverError;
 use crate::numbers::parallel;
 
 /// Bins of which all directions are held at a time.
-const CHUNK_BINS: usize = 256;
+const CHUNK_BINS: usize = 64;
+/// Bins of which products are computed together: those of some hundred directions stay near the processor.
+const TILE_BINS: usize = 4;
 /// Directions whose products are computed together.
 const PANEL: usize = 128;
 /// Greatest number of blocks whose signs are flipped apart; more are joined.
@@ -42,9 +44,22 @@ pub(crate) enum Direction<'a> {
     Times { direction: usize, factor: Arc<Vec<f64>> },
     /// Values of any bins, bin by bin, element by element.
     Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
+    /// Values of any bins at one element, bin by bin; 0 at all others.
+    OfElement(usize, Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
 }
 
-impl Direction<'_> {
+impl<'a> Direction<'a> {
+    /// One of these values: at one element, or at all.
+    pub(crate) fn computed(
+        only: Option<usize>,
+        values: impl Fn(Range<usize>) -> Vec<f64> + Sync + 'a,
+    ) -> Self {
+        match only {
+            Some(element) => Self::OfElement(element, Box::new(values)),
+            None => Self::Column(Box::new(values)),
+        }
+    }
+
     /// The same direction in a list with so many others before.
     pub(crate) fn after(self, others: usize) -> Self {
         if let Self::Times { direction, factor } = self {
@@ -128,23 +143,61 @@ enum Running<'a> {
         factor: Arc<Vec<f64>>,
     },
     Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
+    OfElement(usize, Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
 }
 
 /// The directions' values at the bins of a chunk, and the gains'.
 struct Chunk {
     bins: Range<usize>,
-    columns: Vec<Vec<f64>>,
+    columns: Vec<Column>,
     by_gain: Vec<f64>,
+}
+
+/// A direction's values at the bins of a chunk.
+enum Column {
+    /// Bin by bin, element by element.
+    Every(Vec<f64>),
+    /// Those at one element, bin by bin.
+    One(usize, Vec<f64>),
 }
 
 /// Sums over bins of one segment.
 struct Sums {
     segment: usize,
-    /// The directions that do something there, in order.
+    /// The directions that do something there: first those of all elements, in order, then those of one element each.
     active: Vec<usize>,
     /// Products of those: in the rows of the pivots and of the residual, and on the diagonal.
     products: DMatrix<f64>,
     border: Border,
+}
+
+/// A direction of one element that does something in a part of a chunk.
+struct Alone<'a> {
+    number: usize,
+    element: usize,
+    /// The place of the element among those that are weighed.
+    place: usize,
+    /// Bin by bin, of the whole chunk.
+    values: &'a [f64],
+}
+
+/// The weighed readings of some bins: bin by bin, element by element.
+struct Readings<'a> {
+    bins: &'a [usize],
+    /// The first bin of the chunk.
+    first_bin: usize,
+    per_bin: usize,
+    /// The roots of their weights, and the derivatives by the gains times those.
+    roots: &'a [f64],
+    gains: &'a [f64],
+}
+
+impl Readings<'_> {
+    /// The readings at which a direction of one element acts, with its values times the roots of the weights.
+    fn values(&self, of: &Alone<'_>) -> impl Iterator<Item = (usize, f64)> {
+        let at = (of.place..self.roots.len()).step_by(self.per_bin);
+        self.bins.iter().zip(at).map(|(bin, at)| (at, of.values[bin - self.first_bin] * self.roots[at]))
+    }
 }
 
 impl Problem<'_> {
@@ -168,41 +221,81 @@ impl Problem<'_> {
         let (parameters, step) = with_more_gain(at);
         running.push(self.running(Direction::Towards { parameters, step, factor: None }, at)?);
         let mut trunk = self.predictor.stream(at.clone())?;
-        for first in (0..bins.len()).step_by(CHUNK_BINS) {
-            let range = first..(first + CHUNK_BINS).min(bins.len());
-            let reached = trunk.reach(range.len())?;
-            let wanted = |bin: usize| self.train[bin] > 0.0;
-            let column =
-                |direction: &Running<'_>| direction.values(range.clone(), &reached, &wanted, predicted);
-            let mut columns: Vec<Vec<f64>> =
-                parallel::map(&running, column).into_iter().collect::<Result<_, DiscoverError>>()?;
-            let by_gain = columns.pop().unwrap_or_default();
-            for (number, direction) in running.iter().enumerate().take(columns.len()) {
-                match direction {
-                    Running::RunGain(run) => columns[number] = self.of_run(*run, range.start, &by_gain),
-                    Running::Times { direction, factor } => {
-                        columns[number] = times(&columns[*direction], &factor[range.clone()]);
-                    }
-                    Running::Towards { .. } | Running::Column(_) => {}
-                }
+        let pivots = if kept == Kept::OwnAndBlocks { own } else { count };
+        let chunks: Vec<Range<usize>> = (0..bins.len())
+            .step_by(CHUNK_BINS)
+            .map(|first| first..(first + CHUNK_BINS).min(bins.len()))
+            .collect();
+        let mut computed: Option<Chunk> = None;
+        // The products of a chunk are summed while the next one is computed.
+        for range in chunks.into_iter().map(Some).chain([None]) {
+            let (next, summed) = rayon::join(
+                || range.map(|range| self.chunk(range, &running, &mut trunk, predicted)).transpose(),
+                || {
+                    computed
+                        .as_ref()
+                        .map(|chunk| self.sums_of_chunk(chunk, &standing, segments, joined, pivots))
+                },
+            );
+            for (number, first_bin, sums) in summed.into_iter().flatten() {
+                total.add(number, first_bin, own, &sums, kept);
             }
-            for (column, direction) in columns.iter_mut().zip(&running) {
-                if let Running::Towards { factor: Some(factor), .. } = direction {
-                    *column = times(column, &factor[range.clone()]);
-                }
-            }
-            let chunk = Chunk { bins: range.clone(), columns, by_gain };
-            // The chunk's parts of one block and one segment each.
-            let key = |bin: usize| (bins.block[bin] / joined, segments.of_bin[bin]);
-            let used: Vec<usize> = range.filter(|bin| self.train[*bin] > 0.0).collect();
-            let parts: Vec<&[usize]> = used.chunk_by(|one, next| key(*one) == key(*next)).collect();
-            let pivots = if kept == Kept::OwnAndBlocks { own } else { count };
-            let sums = parallel::map(&parts, |part| self.sums_of(&chunk, part, &standing, segments, pivots));
-            for (part, sums) in parts.iter().zip(&sums) {
-                total.add(bins.block[part[0]] / joined, part[0], own, sums, kept);
-            }
+            computed = next?;
         }
         Ok(total)
+    }
+
+    /// The values of all directions, the last of which is that of the gains, at the bins of a chunk.
+    fn chunk(
+        &self,
+        range: Range<usize>,
+        running: &[Running<'_>],
+        trunk: &mut Stream<'_>,
+        predicted: &[f64],
+    ) -> Result<Chunk, DiscoverError> {
+        let reached = trunk.reach(range.len())?;
+        let wanted = |bin: usize| self.train[bin] > 0.0;
+        let values = |direction: &Running<'_>| direction.values(range.clone(), &reached, &wanted, predicted);
+        let mut values: Vec<Vec<f64>> =
+            parallel::map(running, values).into_iter().collect::<Result<_, DiscoverError>>()?;
+        let by_gain = values.pop().unwrap_or_default();
+        for (number, direction) in running.iter().enumerate().take(values.len()) {
+            match direction {
+                Running::RunGain(run) => values[number] = self.of_run(*run, range.start, &by_gain),
+                Running::Times { direction, factor } => {
+                    values[number] = times(&values[*direction], &factor[range.clone()]);
+                }
+                Running::Towards { .. } | Running::Column(_) | Running::OfElement(..) => {}
+            }
+        }
+        let column = |(values, direction): (Vec<f64>, &Running<'_>)| match direction {
+            Running::Towards { factor: Some(factor), .. } => {
+                Column::Every(times(&values, &factor[range.clone()]))
+            }
+            Running::OfElement(element, _) => Column::One(*element, values),
+            Running::Towards { .. } | Running::RunGain(_) | Running::Times { .. } | Running::Column(_) => {
+                Column::Every(values)
+            }
+        };
+        Ok(Chunk { columns: values.into_iter().zip(running).map(column).collect(), bins: range, by_gain })
+    }
+
+    /// Sums over each part of a chunk that belongs to one block and one segment, with the block's number and the part's first bin.
+    fn sums_of_chunk(
+        &self,
+        chunk: &Chunk,
+        standing: &[f64],
+        segments: &Segments,
+        joined: usize,
+        pivots: usize,
+    ) -> Vec<(usize, usize, Sums)> {
+        let block = &self.predictor.bins.block;
+        let key = |bin: usize| (block[bin] / joined, segments.of_bin[bin]);
+        let used: Vec<usize> = chunk.bins.clone().filter(|bin| self.train[*bin] > 0.0).collect();
+        let parts: Vec<&[usize]> = used.chunk_by(|one, next| key(*one) == key(*next)).collect();
+        parallel::map(&parts, |part| {
+            (block[part[0]] / joined, part[0], self.sums_of(chunk, part, standing, segments, pivots))
+        })
     }
 
     fn running<'a>(
@@ -220,6 +313,7 @@ impl Problem<'_> {
             Direction::RunGain(run) => Running::RunGain(run),
             Direction::Times { direction, factor } => Running::Times { direction, factor },
             Direction::Column(values) => Running::Column(values),
+            Direction::OfElement(element, values) => Running::OfElement(element, values),
         })
     }
 
@@ -245,11 +339,37 @@ impl Problem<'_> {
         let weighed: Vec<usize> =
             (0..elements).filter(|element| self.element_weight[*element] > 0.0).collect();
         let per_bin = weighed.len();
-        // Weighed readings of a column in the part's bins, times the roots of their weights: bin by bin, element by element.
-        let rooted = |column: &[f64], roots: &[f64], to: &mut Vec<f64>| {
-            for (bin, roots) in part.iter().zip(roots.chunks_exact(per_bin.max(1))) {
-                let start = (bin - chunk.bins.start) * elements;
-                let of_bin = &column[start..start + elements];
+        let standing = &standing[chunk.bins.start * elements..chunk.bins.end * elements];
+        let column = |number: usize| match chunk.columns.get(number) {
+            Some(Column::Every(values)) => values.as_slice(),
+            Some(Column::One(..)) => &[],
+            None => standing,
+        };
+        let readings_of = |bin: &usize| {
+            let start = (bin - chunk.bins.start) * elements;
+            start..start + elements
+        };
+        // Directions that do nothing here, such as those of contact far from it, take no part.
+        let acts = |number: &usize| match column(*number) {
+            [] => false,
+            column => part.iter().any(|bin| column[readings_of(bin)].iter().any(|value| *value != 0.0)),
+        };
+        let of_all: Vec<usize> = (0..count).filter(acts).collect();
+        let of_one = chunk.of_one(part, &weighed);
+        let first = of_all.iter().take_while(|number| **number < pivots).count();
+        let has_residual = of_all.last() == Some(&(count - 1));
+        let active: Vec<usize> =
+            of_all.iter().copied().chain(of_one.iter().map(|alone| alone.number)).collect();
+        let mut sums = Sums {
+            segment: segments.of_bin[part[0]],
+            products: DMatrix::zeros(active.len(), active.len()),
+            border: Border::new(count, elements),
+            active,
+        };
+        // Weighed readings of a column in some bins, times the roots of their weights: bin by bin, element by element.
+        let rooted = |column: &[f64], bins: &[usize], roots: &[f64], to: &mut Vec<f64>| {
+            for (bin, roots) in bins.iter().zip(roots.chunks_exact(per_bin.max(1))) {
+                let of_bin = &column[readings_of(bin)];
                 if per_bin == elements {
                     to.extend(of_bin.iter().zip(roots).map(|(value, root)| value * root));
                 } else {
@@ -257,84 +377,29 @@ impl Problem<'_> {
                 }
             }
         };
-        let root = |bin: &usize| {
-            let of_bin = self.train[*bin];
-            weighed.iter().map(move |element| (of_bin * self.element_weight[*element]).sqrt())
-        };
-        let roots: Vec<f64> = part.iter().flat_map(root).collect();
-        let standing = &standing[chunk.bins.start * elements..chunk.bins.end * elements];
-        let mut border = Border::new(count, elements);
-        let mut gains = Vec::with_capacity(roots.len());
-        rooted(&chunk.by_gain, &roots, &mut gains);
-        let of_bins = || roots.chunks_exact(per_bin.max(1)).zip(gains.chunks_exact(per_bin.max(1)));
-        for (roots, gains) in of_bins() {
-            for ((element, root), gain) in weighed.iter().zip(roots).zip(gains) {
-                let [one, mixed, square] = &mut border.own[*element];
-                *one += root * root;
-                *mixed += root * gain;
-                *square += gain * gain;
+        let (mut roots, mut gains, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        for bins in part.chunks(TILE_BINS) {
+            roots.clear();
+            roots.extend(bins.iter().flat_map(|bin| {
+                let of_bin = self.train[*bin];
+                weighed.iter().map(move |element| (of_bin * self.element_weight[*element]).sqrt())
+            }));
+            gains.clear();
+            rooted(&chunk.by_gain, bins, &roots, &mut gains);
+            values.clear();
+            for number in &of_all {
+                rooted(column(*number), bins, &roots, &mut values);
             }
+            sums.border.take(&of_all, &weighed, [&roots, &gains], &values);
+            let tile = DMatrix::from_vec(roots.len(), of_all.len(), std::mem::take(&mut values));
+            sums.take(&tile, first, has_residual);
+            let readings =
+                Readings { bins, first_bin: chunk.bins.start, per_bin, roots: &roots, gains: &gains };
+            sums.take_alone(&readings, &tile, first, has_residual, &of_one, pivots == count);
+            values = tile.data.into();
         }
-        // Directions that do nothing here, such as those of contact far from it, take no part.
-        let mut active: Vec<usize> = Vec::new();
-        let mut values: Vec<f64> = Vec::with_capacity(roots.len() * count);
-        let (mut by_baseline, mut by_gain) = (vec![0.0; per_bin], vec![0.0; per_bin]);
-        for number in 0..count {
-            let column = chunk.columns.get(number).map_or(standing, |column| column);
-            let at = values.len();
-            rooted(column, &roots, &mut values);
-            if values[at..].iter().all(|value| *value == 0.0) {
-                values.truncate(at);
-                continue;
-            }
-            active.push(number);
-            by_baseline.fill(0.0);
-            by_gain.fill(0.0);
-            for (values, (roots, gains)) in values[at..].chunks_exact(per_bin).zip(of_bins()) {
-                for ((sum, value), root) in by_baseline.iter_mut().zip(values).zip(roots) {
-                    *sum += value * root;
-                }
-                for ((sum, value), gain) in by_gain.iter_mut().zip(values).zip(gains) {
-                    *sum += value * gain;
-                }
-            }
-            for ((element, of_baseline), of_gain) in weighed.iter().zip(&by_baseline).zip(&by_gain) {
-                border.by_baseline[(*element, number)] = *of_baseline;
-                border.by_gain[(*element, number)] = *of_gain;
-            }
-        }
-        let values = DMatrix::from_vec(roots.len(), active.len(), values);
-        let first = active.iter().take_while(|number| **number < pivots).count();
-        let mut products = DMatrix::zeros(active.len(), active.len());
-        // The products of the pivots with each other are the same both ways, so only one half of them is computed, panel by panel.
-        for start in (0..first).step_by(PANEL) {
-            let (rows, after) = (PANEL.min(first - start), active.len() - start);
-            products.view_mut((start, start), (rows, after)).gemm(
-                1.0,
-                &values.columns(start, rows).transpose(),
-                &values.columns(start, after),
-                0.0,
-            );
-        }
-        for column in 0..first {
-            for row in column + 1..first {
-                products[(row, column)] = products[(column, row)];
-            }
-        }
-        let has_residual = active.last() == Some(&(count - 1));
-        for (place, column) in values.column_iter().enumerate().skip(first) {
-            products[(place, place)] = column.norm_squared();
-            if has_residual {
-                let residual = active.len() - 1;
-                products[(residual, place)] = column.dot(&values.column(residual));
-            }
-        }
-        if has_residual && first < active.len() {
-            for place in 0..first {
-                products[(active.len() - 1, place)] = products[(place, active.len() - 1)];
-            }
-        }
-        Sums { segment: segments.of_bin[part[0]], active, products, border }
+        sums.mirror();
+        sums
     }
 }
 
@@ -361,7 +426,7 @@ impl Running<'_> {
         predicted: &[f64],
     ) -> Result<Vec<f64>, DiscoverError> {
         let (stream, per_step) = match self {
-            Self::Column(values) => return Ok(values(bins)),
+            Self::Column(values) | Self::OfElement(_, values) => return Ok(values(bins)),
             Self::RunGain(_) | Self::Times { .. } => return Ok(Vec::new()),
             Self::Towards { stream, per_step, .. } => (stream, per_step),
         };
@@ -374,7 +439,115 @@ impl Running<'_> {
     }
 }
 
+impl Chunk {
+    /// The directions of one element each that do something in some bins.
+    fn of_one(&self, bins: &[usize], weighed: &[usize]) -> Vec<Alone<'_>> {
+        let mut found = Vec::new();
+        for (number, column) in self.columns.iter().enumerate() {
+            let Column::One(element, values) = column else { continue };
+            let Some(place) = weighed.iter().position(|one| one == element) else { continue };
+            if bins.iter().any(|bin| values[bin - self.bins.start] != 0.0) {
+                found.push(Alone { number, element: *element, place, values });
+            }
+        }
+        found
+    }
+}
+
+impl Sums {
+    /// Adds the products of a tile, a row a reading and a column a direction: of the first directions with those after them, panel by
+    /// panel, and of each other with itself and with the residual, which is the last if it is there. Of those that are the same both ways the
+    /// ones above the diagonal are computed.
+    fn take(&mut self, tile: &DMatrix<f64>, first: usize, has_residual: bool) {
+        let count = tile.ncols();
+        for start in (0..first).step_by(PANEL) {
+            let (rows, after) = (PANEL.min(first - start), count - start);
+            self.products.view_mut((start, start), (rows, after)).gemm(
+                1.0,
+                &tile.columns(start, rows).transpose(),
+                &tile.columns(start, after),
+                1.0,
+            );
+        }
+        for (place, column) in tile.column_iter().enumerate().skip(first) {
+            self.products[(place, place)] += column.norm_squared();
+            if has_residual && place + 1 < count {
+                self.products[(place, count - 1)] += column.dot(&tile.column(count - 1));
+            }
+        }
+    }
+
+    /// Adds the products of directions of one element each with those that are the first of a tile, with the residual and with themselves; also
+    /// those of one element with each other, if they are asked for.
+    fn take_alone(
+        &mut self,
+        of: &Readings<'_>,
+        tile: &DMatrix<f64>,
+        first: usize,
+        has_residual: bool,
+        of_one: &[Alone<'_>],
+        with_each_other: bool,
+    ) {
+        let of_all = tile.ncols();
+        let residual = has_residual.then(|| of_all - 1).filter(|residual| *residual >= first);
+        for (nth, alone) in of_one.iter().enumerate() {
+            let with = |others: &[f64]| of.values(alone).map(|(at, value)| value * others[at]).sum::<f64>();
+            self.border.by_baseline[(alone.element, alone.number)] += with(of.roots);
+            self.border.by_gain[(alone.element, alone.number)] += with(of.gains);
+            let place = of_all + nth;
+            for other in (0..first).chain(residual) {
+                let start = other * tile.nrows();
+                self.products[(other, place)] += with(&tile.as_slice()[start..start + tile.nrows()]);
+            }
+            for (other, another) in of_one.iter().enumerate().take(nth + 1) {
+                if other == nth || with_each_other && another.place == alone.place {
+                    let pairs = of.values(alone).zip(of.values(another));
+                    self.products[(of_all + other, place)] +=
+                        pairs.map(|((_, a), (_, b))| a * b).sum::<f64>();
+                }
+            }
+        }
+    }
+
+    /// Fills in what is the same below the diagonal.
+    fn mirror(&mut self) {
+        self.products.fill_lower_triangle_with_upper_triangle();
+    }
+}
+
 impl Border {
+    /// Adds readings of a tile: of each, the root of its weight, the derivative by the gain and the directions that do something, times that
+    /// root.
+    fn take(&mut self, active: &[usize], weighed: &[usize], [roots, gains]: [&[f64]; 2], values: &[f64]) {
+        let per_bin = weighed.len().max(1);
+        let of_bins = || roots.chunks_exact(per_bin).zip(gains.chunks_exact(per_bin));
+        for (roots, gains) in of_bins() {
+            for ((element, root), gain) in weighed.iter().zip(roots).zip(gains) {
+                let [one, mixed, square] = &mut self.own[*element];
+                *one += root * root;
+                *mixed += root * gain;
+                *square += gain * gain;
+            }
+        }
+        let (mut by_baseline, mut by_gain) = (vec![0.0; per_bin], vec![0.0; per_bin]);
+        for (number, values) in active.iter().zip(values.chunks_exact(roots.len().max(1))) {
+            by_baseline.fill(0.0);
+            by_gain.fill(0.0);
+            for (values, (roots, gains)) in values.chunks_exact(per_bin).zip(of_bins()) {
+                for ((sum, value), root) in by_baseline.iter_mut().zip(values).zip(roots) {
+                    *sum += value * root;
+                }
+                for ((sum, value), gain) in by_gain.iter_mut().zip(values).zip(gains) {
+                    *sum += value * gain;
+                }
+            }
+            for ((element, of_baseline), of_gain) in weighed.iter().zip(&by_baseline).zip(&by_gain) {
+                self.by_baseline[(*element, *number)] += *of_baseline;
+                self.by_gain[(*element, *number)] += *of_gain;
+            }
+        }
+    }
+
     fn new(count: usize, elements: usize) -> Self {
         let zeros = || DMatrix::zeros(elements, count);
         Self { by_baseline: zeros(), by_gain: zeros(), own: vec![[0.0; 3]; elements] }

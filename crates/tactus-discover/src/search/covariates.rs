@@ -52,6 +52,16 @@ pub(crate) struct Feature {
     pub(crate) factor: Factor,
 }
 
+impl Feature {
+    /// The element at which alone it acts, if it does not act at all.
+    pub(crate) const fn only(&self) -> Option<usize> {
+        match self.factor {
+            Factor::Element(element, _) => Some(element),
+            Factor::Bins(_) | Factor::Within(_) => None,
+        }
+    }
+}
+
 /// Factor of a form.
 #[derive(Debug, Clone)]
 pub(crate) enum Factor {
@@ -118,7 +128,7 @@ impl Forms {
         self.values(feature, 0..self.signal.len() / elements, elements)
     }
 
-    /// A feature's column at some bins.
+    /// A feature's column at some bins: element by element, or only of the one at which it acts.
     pub(crate) fn values(&self, feature: &Feature, bins: Range<usize>, elements: usize) -> Vec<f64> {
         let form = match feature.form {
             Form::Offset => None,
@@ -129,34 +139,27 @@ impl Forms {
             Form::Place => self.places.as_ref().map(|[here, _]| here),
             Form::LastPlace => self.places.as_ref().map(|[_, last]| last),
         };
-        let (first, count) = (bins.start * elements, bins.len() * elements);
-        let mut values = vec![0.0; count];
         let of = |reading: usize| form.map_or(1.0, |form| form[reading]);
+        let (first, count) = (bins.start * elements, bins.len() * elements);
         match &feature.factor {
             Factor::Bins(of_bin) => {
+                let mut values = vec![0.0; count];
                 // Most features act in few bins.
-                let acting = bins.clone().filter(|bin| of_bin[*bin] != 0.0);
-                for bin in acting {
+                for bin in bins.filter(|bin| of_bin[*bin] != 0.0) {
                     for reading in bin * elements..(bin + 1) * elements {
                         values[reading - first] = of_bin[bin] * of(reading);
                     }
                 }
+                values
             }
             Factor::Within(range) => {
-                for (value, reading) in values.iter_mut().zip(first..) {
-                    if is_within(*range, self.signal[reading]) {
-                        *value = of(reading);
-                    }
-                }
+                let value = |reading| if is_within(*range, self.signal[reading]) { of(reading) } else { 0.0 };
+                (first..first + count).map(value).collect()
             }
             Factor::Element(element, of_bin) => {
-                for bin in bins {
-                    let reading = bin * elements + element;
-                    values[reading - first] = of_bin[bin] * of(reading);
-                }
+                bins.map(|bin| of_bin[bin] * of(bin * elements + element)).collect()
             }
         }
-        values
     }
 
     pub(crate) const fn history(&self) -> &History {

@@ -35,8 +35,8 @@ use crate::progress::Stage;
 
 /// Atoms that are weighed by their evidence.
 const WEIGHED_MAX: usize = 12;
-/// Greatest number of columns of a pass over second covariates.
-const COLUMNS_MAX: usize = 200;
+/// Greatest number of columns of a pass: the parts of blocks take memory.
+const COLUMNS_MAX: usize = 512;
 /// Drafts that are tried as effects, the best first.
 const TRIED_MAX: usize = 3;
 /// Knots of the curve of a covariate, and of a second one beside it.
@@ -113,6 +113,13 @@ struct AsEffect {
     at: Fitted,
     covariance: Vec<Vec<f64>>,
     knots: Vec<[f64; 3]>,
+}
+
+/// An atom with its columns in one of the passes that test each column by itself.
+struct Screened<'a> {
+    atom: &'a Atom,
+    own: Range<usize>,
+    grams: Arc<Grams>,
 }
 
 /// An atom with its columns in a pass.
@@ -246,22 +253,34 @@ impl Search<'_> {
         sight: &Arc<Sight>,
         atoms: &[Atom],
     ) -> Result<(f64, Vec<Atom>), DiscoverError> {
-        let mut directions = Vec::new();
-        let mut of_atoms: Vec<Range<usize>> = Vec::new();
-        for atom in atoms {
-            let first = directions.len();
-            directions.extend(sight.columns(atom));
-            of_atoms.push(first..directions.len());
+        let mut screened: Vec<Screened<'_>> = Vec::new();
+        let mut rest = atoms;
+        while !rest.is_empty() {
+            let mut directions = Vec::new();
+            let mut of_atoms: Vec<(&Atom, Range<usize>)> = Vec::new();
+            for atom in rest {
+                if !directions.is_empty() && directions.len() + atom.columns(sight.elements) > COLUMNS_MAX {
+                    break;
+                }
+                let first = directions.len();
+                directions.extend(sight.columns(atom));
+                of_atoms.push((atom, first..directions.len()));
+            }
+            rest = &rest[of_atoms.len()..];
+            let grams = Arc::new(self.problem.grams_of_each(at, directions)?);
+            screened.extend(of_atoms.into_iter().map(|(atom, own)| Screened {
+                atom,
+                own,
+                grams: Arc::clone(&grams),
+            }));
         }
-        let grams = self.problem.grams_of_each(at, directions)?;
-        let score = |(atom, own): &(&Atom, &Range<usize>)| -> Vec<Score> {
+        let score = |Screened { atom, own, grams }: &Screened<'_>| -> Vec<Score> {
             let is_there =
                 |one: &usize| grams.size(*one) > 1e-3 * grams.whole(*one) && grams.size(*one) > 0.0;
-            let of_each = (*own).clone().filter(is_there);
-            of_each.map(|one| Score::of_grams(&grams, &[one]).picked_from(atom.among)).collect()
+            let of_each = own.clone().filter(is_there);
+            of_each.map(|one| Score::of_grams(grams, &[one]).picked_from(atom.among)).collect()
         };
-        let pairs: Vec<(&Atom, &Range<usize>)> = atoms.iter().zip(&of_atoms).collect();
-        let scores: Vec<Vec<Score>> = parallel::map(&pairs, score);
+        let scores: Vec<Vec<Score>> = parallel::map(&screened, score);
         let groups: Vec<Vec<&Score>> = scores.iter().map(|of| of.iter().collect()).collect();
         let under_none = largest(&flipped(&groups, FLIPS, self.options.seed ^ STREAM));
         let statistic = scores.iter().flatten().map(|score| score.z).fold(0.0, f64::max);
@@ -273,8 +292,9 @@ impl Search<'_> {
         order.sort_by(|a, b| strength(&scores[*b]).total_cmp(&strength(&scores[*a])));
         order.truncate(WEIGHED_MAX);
         let first = order.into_iter().map(|place| {
-            let atom = atoms[place].clone();
-            if atom.of_elements { sight.with_curve(atom, &grams, of_atoms[place].clone()) } else { atom }
+            let Screened { atom, own, grams } = &screened[place];
+            let atom = (*atom).clone();
+            if atom.of_elements { sight.with_curve(atom, grams, own.clone()) } else { atom }
         });
         Ok((p_value(statistic, &under_none), first.collect()))
     }

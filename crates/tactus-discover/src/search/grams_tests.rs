@@ -1,10 +1,12 @@
+use std::ops::Range;
+
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tactus_model::Effect;
 
 use super::{Score, standardised};
-use crate::fit::{Fitted, Free, Prepared, Problem, Term};
+use crate::fit::{Direction, Fitted, Free, Prepared, Problem, Term};
 use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
 
 /// The same products from whole columns, orthogonal to gains, baselines and the model's own parameters one by one.
@@ -28,11 +30,29 @@ fn products_are_those_of_whole_columns_that_are_projected_one_by_one() {
             (start, Free::Of { term, parameter: 0 })
         })
         .collect();
-    let directions = tried.iter().map(|(start, free)| problem.towards(start, *free)).collect();
-    let grams = problem.grams(&at, directions).unwrap();
-
-    let columns: Vec<Vec<f64>> =
+    let mut columns: Vec<Vec<f64>> =
         tried.iter().map(|(start, free)| problem.slope(start, &at.predicted, *free).unwrap()).collect();
+    // Of single elements: two of one, and one of another.
+    let of_one: Vec<(usize, Vec<f64>)> = [(0, 5), (2, 5), (0, 7)]
+        .into_iter()
+        .map(|(column, element): (usize, usize)| {
+            (element, columns[column].iter().skip(element).step_by(ELEMENTS).copied().collect())
+        })
+        .collect();
+    for (element, values) in &of_one {
+        let mut column = vec![0.0; columns[0].len()];
+        column.iter_mut().skip(*element).step_by(ELEMENTS).zip(values).for_each(|(to, value)| *to = *value);
+        columns.push(column);
+    }
+    let directions = || {
+        let of_one = of_one.iter().map(|(element, values)| {
+            Direction::computed(Some(*element), |bins: Range<usize>| values[bins].to_vec())
+        });
+        tried.iter().map(|(start, free)| problem.towards(start, *free)).chain(of_one).collect()
+    };
+    let grams = problem.grams(&at, directions()).unwrap();
+    let of_each = problem.grams_of_each(&at, directions()).unwrap();
+
     let whole = Whole::of(&problem, &at, columns);
     let last = whole.columns.len();
     for (i, one) in whole.columns.iter().enumerate() {
@@ -43,6 +63,8 @@ fn products_are_those_of_whole_columns_that_are_projected_one_by_one() {
             near(grams.reduced()[(i, j)], one.dot(other), one.norm() * other.norm());
         }
         near(grams.reduced()[(i, last)], one.dot(&whole.residual), one.norm() * 100.0);
+        near(of_each.reduced()[(i, i)], one.norm_squared(), one.norm_squared());
+        near(of_each.wanted(i), one.dot(&whole.residual), one.norm() * 100.0);
         let (of_grams, of_columns) = (Score::of_grams(&grams, &[i]).z, whole.score(&problem, one));
         assert!((of_grams - of_columns).abs() < 1e-2 * of_columns.max(1.0), "{i}: {of_grams} {of_columns}");
     }

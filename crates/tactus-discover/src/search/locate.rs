@@ -80,7 +80,7 @@ impl Search<'_> {
         let features = features(problem, &forms);
         let column = |feature: &Feature| -> Direction<'_> {
             let (forms, feature) = (&forms, feature.clone());
-            Direction::Column(Box::new(move |bins| forms.values(&feature, bins, elements)))
+            Direction::computed(feature.only(), move |bins| forms.values(&feature, bins, elements))
         };
         let grams = problem.grams_of_each(at, features.iter().map(column).collect())?;
         let scored = |index: usize| {

@@ -285,9 +285,7 @@ impl Seen {
     fn column<'a>(self: &Arc<Self>, factor: Factor, form: Form) -> Direction<'a> {
         let seen = Arc::clone(self);
         let feature = Feature { covariate: "", unit: "", form, range: [0.0; 2], factor };
-        Direction::Column(Box::new(move |bins: Range<usize>| {
-            seen.forms.values(&feature, bins, seen.elements)
-        }))
+        Direction::computed(feature.only(), move |bins| seen.forms.values(&feature, bins, seen.elements))
     }
 
     /// A smooth function of a value of single readings in contact, times another value.

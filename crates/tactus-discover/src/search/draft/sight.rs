@@ -202,17 +202,19 @@ impl Sight {
         let count = atom.columns(self.elements);
         let column = |number: usize| -> Direction<'a> {
             let (sight, atom) = (Arc::clone(self), atom.clone());
-            Direction::Column(Box::new(move |bins: Range<usize>| sight.column(&atom, number, bins)))
+            let (_, only) = atom.part(number, self.elements);
+            Direction::computed(only, move |bins| sight.column(&atom, number, bins))
         };
         (0..count).map(column).collect()
     }
 
+    /// The values of a column of an atom: bin by bin, element by element, or those at its only element.
     fn column(&self, atom: &Atom, number: usize, bins: Range<usize>) -> Vec<f64> {
         let unit = self.unit_of(atom.carrier);
-        let mut column = vec![0.0; bins.len() * self.elements];
-        let first = bins.start * self.elements;
         let (curve, only) = atom.part(number, self.elements);
         let elements = only.map_or(0..self.elements, |element| element..element + 1);
+        let mut column = vec![0.0; bins.len() * elements.len()];
+        let first_bin = bins.start;
         let is_common = !atom.covariates.iter().any(|covariate| covariate.is_of_element());
         for bin in bins {
             if !atom.when.is_now(&self.traces[bin]) {
@@ -227,7 +229,8 @@ impl Sight {
                 let factor = if is_common { common } else { atom.factor(curve, seen, element) };
                 let weight = atom.weights.as_ref().map_or(1.0, |weights| weights[element]);
                 let reading = bin * self.elements + element;
-                column[reading - first] = factor * weight * f64::from(unit[reading]);
+                column[(bin - first_bin) * elements.len() + element - elements.start] =
+                    factor * weight * f64::from(unit[reading]);
             }
         }
         column
