@@ -21,7 +21,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use tactus_model::effect::{Carrier, Draft};
+use tactus_model::effect::{Carrier, Draft, PipelineStage};
 
 use self::grammar::Atom;
 use self::sight::Sight;
@@ -89,6 +89,8 @@ pub enum NoDraft {
     TakenUp,
     /// As an effect it gains too little.
     NoGain,
+    /// It acts where a name acts, and so little that it may be an error of the name's form.
+    OfAName,
 }
 
 impl NoDraft {
@@ -100,6 +102,7 @@ impl NoDraft {
             Self::Unsteady => "different parts of the data prefer different drafts".into(),
             Self::TakenUp => "recalibration takes up most of what it would explain".into(),
             Self::NoGain => "as an effect it explains too little".into(),
+            Self::OfAName => "it may be an error of the form of a name that acts at the same place".into(),
         }
     }
 }
@@ -170,8 +173,15 @@ impl Field<'_> {
 
 impl Search<'_> {
     /// Drafts what a model leaves, as an effect of this name. If what comes first is no draft, that which comes next is tried, as if the first
-    /// were not in the grammar. Classes that the data refute are no reason against it.
-    pub(crate) fn draft(&self, at: &Fitted, name: &str, refuted: &[&str]) -> Result<Outcome, DiscoverError> {
+    /// were not in the grammar. Classes that the data refute are no reason against it. If what comes first acts at one of the `closed` stages,
+    /// there is none.
+    pub(crate) fn draft(
+        &self,
+        at: &Fitted,
+        name: &str,
+        refuted: &[&str],
+        closed: &[PipelineStage],
+    ) -> Result<Outcome, DiscoverError> {
         let sight = Arc::new(Sight::of(self.problem, at)?);
         self.reporter.enter(Stage::Drafting, "drafting what nobody has named");
         let atoms = grammar::atoms(self.problem, at, &sight, self.rounds);
@@ -192,6 +202,10 @@ impl Search<'_> {
         let mut why = NoDraft::NoGain;
         for nth in 0..TRIED_MAX {
             let Some((best, ln_odds)) = field.best() else { break };
+            let Atom { carrier, covariates, .. } = &field.weighed[best].atom;
+            if closed.contains(&carrier.stage(covariates)) {
+                return Ok(Err(NoDraft::OfAName));
+            }
             match self.drafted(at, &sight, &field, (best, ln_odds, p_value), name)? {
                 Ok(found) => return Ok(Ok(found)),
                 Err(other) if nth == 0 => why = other,

@@ -20,6 +20,8 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use crate::numbers::parallel;
+
 /// Prior odds against a class.
 pub(crate) const ODDS_AGAINST: f64 = 20.0;
 /// Prior odds against one more term of a class.
@@ -266,9 +268,10 @@ impl Evidence<'_> {
         among: &[usize],
         ln_odds_least: f64,
     ) -> Vec<(usize, Gain)> {
+        let others: Vec<usize> = among.iter().copied().filter(|one| !set.members.contains(one)).collect();
+        let gains = parallel::map(&others, |one| self.gain(set, *one));
         let mut best: Vec<(usize, Gain)> = Vec::new();
-        for addition in among.iter().copied().filter(|one| !set.members.contains(one)) {
-            let gain = self.gain(set, addition);
+        for (addition, gain) in others.into_iter().zip(gains) {
             if gain.ln_odds <= ln_odds_least {
                 continue;
             }

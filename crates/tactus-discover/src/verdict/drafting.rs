@@ -95,16 +95,21 @@ pub(super) fn drafted(
     let numbers = 1..=known.len() + prepared.known.drafts.len() + 1;
     let name =
         numbers.map(|number| format!("draft-{number}")).find(|name| !is_known(name)).unwrap_or_default();
-    let found = match search.draft(grown, &name, &refuted)? {
+    // What is too little for the verdict, and acts where a name acts, may be an error of the name's form.
+    let mut closed = Vec::new();
+    if verdict == Verdict::Explained {
+        let added = grown.parameters.terms.iter().skip(search.known_terms);
+        closed.extend(added.map(|term| term.definition.stage()));
+    }
+    let found = match search.draft(grown, &name, &refuted, &closed)? {
         Ok(found) => *found,
         // Names explain all that matters, and nothing describes the rest better.
         Err(_) if verdict == Verdict::Explained => return Ok(Drafting::default()),
         Err(none) => return Ok(Drafting { draft: Some(Err(none)), model: None }),
     };
     if verdict == Verdict::Explained {
-        let mut added = grown.parameters.terms.iter().skip(search.known_terms);
-        // So little, and where a name acts: it may be an error of the name's form.
-        let acts_with_a_name = added.any(|term| term.definition.stage() == found.draft.stage());
+        // A second covariate may bring it to another stage.
+        let acts_with_a_name = closed.contains(&found.draft.stage());
         let gains = search.problem.heldout_gains(&grown.predicted, &found.at.predicted);
         if acts_with_a_name || sign_flip_p(&gains, FLIPS, search.options.seed) > ALPHA {
             return Ok(Drafting::default());

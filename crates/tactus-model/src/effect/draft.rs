@@ -126,6 +126,20 @@ impl Carrier {
         Self::Counts,
     ];
 
+    /// Where in the pipeline a draft acts that depends on these: what depends on signals alone acts in the elements.
+    pub fn stage(self, covariates: &[Covariate]) -> PipelineStage {
+        match self {
+            Self::Depth | Self::X | Self::Y => PipelineStage::Motion,
+            Self::OwnSignal if covariates.iter().copied().all(Covariate::needs_signals) => {
+                PipelineStage::Element
+            }
+            Self::OwnSignal | Self::Neighbours | Self::EveryElement | Self::PressHere | Self::PressThere => {
+                PipelineStage::Covering
+            }
+            Self::Counts => PipelineStage::Readout,
+        }
+    }
+
     /// The name in draft files.
     pub const fn name(self) -> &'static str {
         match self {
@@ -291,19 +305,9 @@ impl Law {
 }
 
 impl Draft {
-    /// Where in the pipeline it acts: what depends on signals alone acts in the elements.
+    /// Where in the pipeline it acts.
     pub fn stage(&self) -> PipelineStage {
-        let is_electric = |covariate: &Covariate| covariate.needs_signals();
-        match self.carrier {
-            Carrier::Depth | Carrier::X | Carrier::Y => PipelineStage::Motion,
-            Carrier::OwnSignal if self.covariates.iter().all(is_electric) => PipelineStage::Element,
-            Carrier::OwnSignal
-            | Carrier::Neighbours
-            | Carrier::EveryElement
-            | Carrier::PressHere
-            | Carrier::PressThere => PipelineStage::Covering,
-            Carrier::Counts => PipelineStage::Readout,
-        }
+        self.carrier.stage(&self.covariates)
     }
 
     /// The draft as an effect's definition.
