@@ -23,8 +23,10 @@ use super::random_walk::is_random_walk;
 use crate::data::DiscoverError;
 use crate::numbers::parallel;
 
-/// Bins of which all directions are held at a time.
-const CHUNK_BINS: usize = 64;
+/// Least and greatest number of bins of which all directions are held at a time.
+const CHUNK_BINS: [usize; 2] = [64, 256];
+/// Directions times bins that are held at a time, between these.
+const CHUNK_COLUMNS: usize = 32_768;
 /// Bins of which products are computed together: those of some hundred directions stay near the processor.
 const TILE_BINS: usize = 4;
 /// Directions whose products are computed together.
@@ -222,13 +224,13 @@ impl Problem<'_> {
         running.push(self.running(Direction::Towards { parameters, step, factor: None }, at)?);
         let mut trunk = self.predictor.stream(at.clone())?;
         let pivots = if kept == Kept::OwnAndBlocks { own } else { count };
-        let chunks: Vec<Range<usize>> = (0..bins.len())
-            .step_by(CHUNK_BINS)
-            .map(|first| first..(first + CHUNK_BINS).min(bins.len()))
-            .collect();
+        let [least, most] = CHUNK_BINS;
+        let chunk_bins = (CHUNK_COLUMNS / count).clamp(least, most);
+        let chunks =
+            (0..bins.len()).step_by(chunk_bins).map(|first| first..(first + chunk_bins).min(bins.len()));
         let mut computed: Option<Chunk> = None;
         // The products of a chunk are summed while the next one is computed.
-        for range in chunks.into_iter().map(Some).chain([None]) {
+        for range in chunks.map(Some).chain([None]) {
             let (next, summed) = rayon::join(
                 || range.map(|range| self.chunk(range, &running, &mut trunk, predicted)).transpose(),
                 || {
@@ -398,7 +400,8 @@ impl Problem<'_> {
             sums.take_alone(&readings, &tile, first, has_residual, &of_one, pivots == count);
             values = tile.data.into();
         }
-        sums.mirror();
+        // What is the same below the diagonal.
+        sums.products.fill_lower_triangle_with_upper_triangle();
         sums
     }
 }
@@ -507,11 +510,6 @@ impl Sums {
                 }
             }
         }
-    }
-
-    /// Fills in what is the same below the diagonal.
-    fn mirror(&mut self) {
-        self.products.fill_lower_triangle_with_upper_triangle();
     }
 }
 
