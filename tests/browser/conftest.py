@@ -65,6 +65,8 @@ def open_page(web, browser):
     yield open_page
     errors = [page.errors for page in pages if page.errors]
     for page in pages:
+        # Shown with a test that fails.
+        print(page.url, page.locator("body").inner_text(), sep="\n")
         page.close()
     assert errors == []
 

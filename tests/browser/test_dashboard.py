@@ -211,20 +211,34 @@ def test_the_colour_bar_is_free_or_fixed_in_counts_or_share(lab, dashboard):
     expect(bar).to_have_attribute("aria-label", "Colour bar from 0 to 40.0 % of the limit")
 
 
-def test_a_dry_run_that_a_newer_one_ended_is_asked_for_again(lab, dashboard):
-    page = loaded(dashboard)
+def refused_once(page, path, words):
+    """The first request for a path is answered with "not now"; returns the requests."""
     asked = []
 
-    def ended_once(route):
+    def refuse_the_first(route):
         asked.append(route.request)
         if len(asked) == 1:
-            route.fulfill(status=503, body="a newer dry run has ended this one")
+            route.fulfill(status=503, body=words)
         else:
             route.continue_()
 
-    page.route("**/plan", ended_once)
+    page.route(path, refuse_the_first)
+    return asked
+
+
+def test_a_dry_run_that_a_newer_one_ended_is_asked_for_again(lab, dashboard):
+    page = loaded(dashboard)
+    asked = refused_once(page, "**/plan", "a newer dry run has ended this one")
     page.select_option("#experiment", "image")
     expect(page.locator("#verdict.possible")).to_contain_text("4, 4 dwells", timeout=PATIENCE_MS)
+    assert len(asked) == 2
+
+
+def test_a_list_of_experiments_that_cannot_be_made_now_is_asked_for_again(lab, open_page):
+    page = open_page(go=False)
+    asked = refused_once(page, "**/experiments", "the experiments are being listed: ask again")
+    page.goto(page.url_with_token)
+    expect(page.locator("#experiment")).to_be_visible(timeout=PATIENCE_MS)
     assert len(asked) == 2
 
 

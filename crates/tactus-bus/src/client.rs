@@ -11,7 +11,7 @@ use tokio::{
     net::{TcpStream, UnixStream},
     sync::{Semaphore, watch},
     task::JoinSet,
-    time::{Instant, timeout, timeout_at},
+    time::{Instant, sleep, timeout, timeout_at},
 };
 use zenoh::{
     Session, Wait,
@@ -35,6 +35,8 @@ const REACH_TIMEOUT: Duration = Duration::from_secs(2);
 const ASKED_AT_ONCE: usize = 64;
 /// Time that the other services on the bus have to answer a stop after the one at the endpoint did.
 const OTHERS_PATIENCE: Duration = Duration::from_secs(1);
+/// An answer that is under way when its service ends may come this much later than the news of the end.
+const LAST_WORDS: Duration = Duration::from_secs(1);
 
 /// A client of one rig's service.
 #[derive(Debug)]
@@ -210,16 +212,29 @@ impl Caller {
         patience: Duration,
     ) -> Result<pb::CommandReply, BusError> {
         let key = self.keys.command(command);
+        let ended = self.trust.ended();
         let replies = ask(&self.session, &key, command, request, patience).await?;
-        while let Ok(reply) = replies.recv_async().await {
-            // Errors come from zenoh: a timeout, or a service that ended.
-            let (Ok(sample), Some(replier)) = (reply.result(), reply.replier_id()) else { continue };
-            if self.trust.has(&replier.zid()) == Some(true) {
-                return decode(&key, sample);
+        let answer = async {
+            while let Ok(reply) = replies.recv_async().await {
+                // Errors come from zenoh: a timeout, or a service that ended.
+                let (Ok(sample), Some(replier)) = (reply.result(), reply.replier_id()) else { continue };
+                if self.trust.has(&replier.zid()) == Some(true) {
+                    return Some(decode(&key, sample));
+                }
+                tracing::warn!(key, replier = %replier.zid(), "an answer that is not the service's is ignored");
             }
-            tracing::warn!(key, replier = %replier.zid(), "an answer that is not the service's is ignored");
-        }
-        Err(BusError::NoAnswer { key, waited: patience })
+            None
+        };
+        // Zenoh ends the query of a service that is gone, but does not promise it.
+        let gone = async {
+            ended.await;
+            sleep(LAST_WORDS).await;
+        };
+        let reply = tokio::select! {
+            reply = answer => reply,
+            () = gone => None,
+        };
+        reply.unwrap_or(Err(BusError::NoAnswer { key, waited: patience }))
     }
 }
 

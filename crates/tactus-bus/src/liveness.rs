@@ -5,6 +5,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
+    future::pending,
     time::Duration,
 };
 
@@ -131,6 +132,19 @@ impl Trust {
             .await
             .ok()?
             .believes(&rig, session)
+    }
+
+    /// Waits until the service that speaks for the rig now does so no longer; for ever if none speaks now. Cancel-safe.
+    pub(crate) fn ended(&self) -> impl Future<Output = ()> + use<> {
+        let Self { rig, mut known } = self.clone();
+        let first = known.borrow().speaks(&rig);
+        async move {
+            let ended = known.wait_for(|known| first.is_some() && known.speaks(&rig) != first).await.is_ok();
+            if !ended {
+                // The client is closed, and so are its queries.
+                pending::<()>().await;
+            }
+        }
     }
 }
 

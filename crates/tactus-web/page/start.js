@@ -7,12 +7,13 @@ import { toRobot, toSensor } from "./place.js";
 import { obstacle } from "./run.js";
 
 /** The form and its dry run. */
-const form = { experiments: null, error: "", name: "", texts: {}, seed: "", who: localStorage.getItem("who") ?? "" };
+const form = { experiments: null, listing: null, error: "", name: "", texts: {}, seed: "", who: localStorage.getItem("who") ?? "" };
 const check = { key: "", state: "none", plan: null, message: "", stop: null };
 const NUMBERS = ["int", "float"];
 const LISTS = ["list-of-int", "list-of-float"];
-/** Who plans at two dashboards at once ends the other's dry run each time. */
+/** Two dashboards at once are in each other's way at each attempt. */
 const ATTEMPTS = 4;
+const AGAIN_MS = 500;
 const NOT_NOW = 503;
 
 /** What a field shows of a value. */
@@ -53,24 +54,31 @@ function key() {
   return JSON.stringify([form.name, values(), form.seed, lab.rig.description?.covering_mm, lab.view.rig]);
 }
 
+/** Keeps the list of experiments; an older question, perhaps to a service that has ended since, is given up. */
 async function loadExperiments(draw) {
-  form.error = "";
+  form.listing?.abort();
+  const stop = new AbortController();
+  Object.assign(form, { listing: stop, error: "" });
+  draw();
   try {
-    form.experiments = JSON.parse(await ask("experiments", undefined, { patience_s: 60 }));
+    const found = await askUntilNow("experiments", undefined, { patience_s: 60, signal: stop.signal });
+    if (form.listing === stop) form.experiments = found;
   } catch (error) {
-    form.error = error.message;
+    if (form.listing === stop) form.error = error.message;
   }
   draw();
 }
 
-/** Asks the service for a dry run. A newer one ends it, also one that was asked for before and comes later, or somebody else's: then it is asked for again. */
-async function dryRun(body, signal) {
+/** Asks again while the service says "not now": for a list that somebody else is getting, and for a dry run that a newer one has ended,
+ * also one that was asked for before and comes later, or somebody else's. */
+async function askUntilNow(path, body, options) {
   for (let left = ATTEMPTS; ; left -= 1) {
     try {
-      return JSON.parse(await ask("plan", body, { patience_s: 310, signal }));
+      return JSON.parse(await ask(path, body, options));
     } catch (error) {
       if (error.status !== NOT_NOW || left === 1) throw error;
     }
+    await new Promise((resolve) => { setTimeout(resolve, AGAIN_MS); });
   }
 }
 
@@ -88,7 +96,7 @@ async function plan(draw) {
   draw();
   try {
     const body = { experiment: form.name, parameters: given, seed: form.seed };
-    const found = await dryRun(body, stop.signal);
+    const found = await askUntilNow("plan", body, { patience_s: 310, signal: stop.signal });
     if (check.stop === stop) Object.assign(check, { state: "done", plan: found });
   } catch (error) {
     if (check.stop === stop) Object.assign(check, { state: "failed", message: error.message });

@@ -2,10 +2,13 @@
 
 use std::time::Duration;
 
-use crate::lab::{free_endpoint, open, raw_session};
+use crate::lab::{connected, free_endpoint, open, raw_session, router};
 use prost::Message as _;
 use tactus_bus::{BusError, Client, CommandCall, Request};
-use tactus_schema::{key::Command, pb};
+use tactus_schema::{
+    key::{Command, Keys},
+    pb,
+};
 use tokio::{net::TcpListener, sync::mpsc};
 
 /// Longer than any test runs, so that a lost call hangs the test instead of passing it.
@@ -178,4 +181,28 @@ async fn a_rig_name_with_a_wildcard_commands_nobody() {
         let error = Client::connect(&endpoint, Some(rig)).await.unwrap_err();
         assert!(matches!(error, BusError::RigName { .. }), "{rig:?}: {error:?}");
     }
+}
+
+/// What zenoh does with a query when its service ends is zenoh's; here it does nothing.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_command_ends_with_its_service_although_nobody_ends_the_query() {
+    let (_router, endpoint) = router().await;
+    let service = raw_session(&endpoint).await;
+    let keys = Keys::new("bench");
+    let queries = service.declare_queryable(keys.command(Command::Experiments)).await.unwrap();
+    let _alive = service.liveliness().declare_token(keys.alive()).await.unwrap();
+    let instance = keys.instance(&service.zid().to_string());
+    let instance = service.liveliness().declare_token(instance).await.unwrap();
+    let client = connected(&endpoint, "bench").await;
+
+    let request = asked_by("test");
+    let asking = client.command(Command::Experiments, &request, PATIENCE);
+    let ending = async {
+        let query = queries.recv_async().await.unwrap();
+        instance.undeclare().await.unwrap();
+        query
+    };
+    let (reply, _query) = tokio::join!(asking, ending);
+    assert!(matches!(reply, Err(BusError::NoAnswer { .. })), "{reply:?}");
+    service.close().await.unwrap();
 }
