@@ -74,31 +74,19 @@ fn discover_on_threads(
     };
     let (formed, mut contests) = search.contested(formed, &mut equivalent)?;
     contests.extend(refused);
-    let confirmed = confirmed(&prepared, &search, formed, &mut equivalent)?;
-    reporter.enter(Stage::LocatingLeft, "locating what remains");
-    let left = search.left(&confirmed.grown)?;
-    let after = search.locate(&confirmed.grown)?;
-    let scatters = [scattered, search.scattered(&confirmed.grown)?];
-    reporter.enter(Stage::Judging, "judging the held-out presses");
-    conclude(
-        &prepared,
-        &search,
-        SearchOutcome {
-            lacking,
-            base,
-            confirmed,
-            rounds,
-            equivalent,
-            contests,
-            exchanged,
-            left,
-            before,
-            after,
-            scatters,
-        },
-        options,
-        experiments,
-    )
+    let confirmed = confirmed(&prepared, &search, formed, &equivalent)?;
+    let outcome = SearchOutcome {
+        lacking,
+        base,
+        confirmed,
+        rounds,
+        equivalent,
+        contests,
+        exchanged,
+        before,
+        scattered,
+    };
+    conclude(&prepared, &search, outcome, experiments)
 }
 
 /// Compares a draft with new data: how strong it is there, and how much it closes of what a model leaves without it. The model's effects are

@@ -256,7 +256,7 @@ impl Covariate {
             Self::SinceRelease => trace.t_s - trace.release_s?,
             Self::SinceTurn => trace.t_s - trace.turn_s,
             Self::Depth => trace.depth_mm,
-            Self::Height => -trace.depth_mm,
+            Self::Height => (-trace.depth_mm).max(0.0),
             Self::DeepestBefore => trace.deepest_before_mm,
             Self::Direction => f64::from(u8::from(trace.is_upward)),
             Self::ApproachX => trace.aside[0],

@@ -14,6 +14,7 @@ use super::gains::GAIN_ERROR_MAX;
 use super::parameters::Parameters;
 use super::problem::Problem;
 use super::sums::{Block, Segments, Total};
+use crate::numbers::parallel;
 
 /// A direction of which gains, baselines and the model's parameters fit all but this share is empty.
 const OWN_LEAST: f64 = 1e-6;
@@ -159,9 +160,9 @@ impl Elimination {
     /// coefficients a sweep has given.
     pub(super) fn parts(&self, blocks: &[Block], coefficients: &DMatrix<f64>) -> Parts {
         let (own, last) = (coefficients.nrows(), coefficients.ncols() - 1);
-        let mut parts = Parts { along: vec![Vec::new(); last - own], squares: vec![Vec::new(); last - own] };
         let fitted = self.coefficients();
-        for block in blocks {
+        // Of a block: the products of each direction with the residual and with itself.
+        let of_block = |block: &Block| -> Vec<[f64; 2]> {
             let (rows, diagonal) = fitted.of_block(block, own);
             // The products of each direction and the residual, less what the model's own directions fit of the residual,
             let left = |number: usize| {
@@ -169,21 +170,25 @@ impl Elimination {
                     - (0..own).map(|one| coefficients[(one, last)] * rows[(one, number)]).sum::<f64>()
             };
             let of_own: Vec<f64> = (0..own).map(left).collect();
-            for number in own..last {
+            let of_direction = |number: usize| {
                 // and less what they fit of the direction.
                 let shares = coefficients.view((0, number), (own, 1));
                 let taken: f64 = shares.iter().zip(&of_own).map(|(share, of)| share * of).sum();
-                parts.along[number - own].push(left(number) - taken);
                 let mut square = diagonal[number];
                 for (one, share) in shares.iter().enumerate() {
                     let of_others: f64 =
                         shares.iter().enumerate().map(|(other, another)| another * rows[(one, other)]).sum();
                     square += share * (of_others - 2.0 * rows[(one, number)]);
                 }
-                parts.squares[number - own].push(square.max(0.0));
-            }
-        }
-        parts
+                [left(number) - taken, square.max(0.0)]
+            };
+            (own..last).map(of_direction).collect()
+        };
+        let by_block = parallel::map(blocks, of_block);
+        let all = |part: usize| -> Vec<Vec<f64>> {
+            (0..last - own).map(|one| by_block.iter().map(|block| block[one][part]).collect()).collect()
+        };
+        Parts { along: all(0), squares: all(1) }
     }
 
     fn coefficients(&self) -> Coefficients {

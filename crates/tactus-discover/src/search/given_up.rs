@@ -22,6 +22,8 @@ pub enum Because {
     Other(&'static str),
     /// Presses that the fit has not seen do not confirm it.
     Unconfirmed,
+    /// What is drafted without it explains as much.
+    Draft,
 }
 
 impl GivenUp {
@@ -29,7 +31,7 @@ impl GivenUp {
     /// confirm it.
     pub(crate) const fn is_refuted(&self) -> bool {
         match self.because {
-            Because::Rival(_) | Because::NearestForm(_) | Because::Unconfirmed => true,
+            Because::Rival(_) | Because::NearestForm(_) | Because::Unconfirmed | Because::Draft => true,
             Because::Little | Because::Other(_) => false,
         }
     }
@@ -46,6 +48,7 @@ impl GivenUp {
             Because::Little => "it explains too little by itself or beside the others".into(),
             Because::Other(other) => format!("{other} explains more in its place"),
             Because::Unconfirmed => "presses or elements that its fit has not seen do not confirm it".into(),
+            Because::Draft => "what is drafted without it explains as much".into(),
         }
     }
 }

@@ -160,6 +160,12 @@ impl Search<'_> {
         by_odds.min(gain / (BLOCKS_Z * error).max(f64::MIN_POSITIVE))
     }
 
+    /// True if a class explains little beside a draft: a model that has both is hardly nearer than one with the draft that is made without it.
+    /// What is small beside the gain of the draft may be the draft's form.
+    pub(crate) fn is_needless(&self, draft_ln_odds: f64, [alone, both]: [&Fitted; 2]) -> bool {
+        self.ln_odds(alone, both) < LN_ODDS_LEAST.max(FORM_SHARE * draft_ln_odds)
+    }
+
     /// The other classes, fitted in a place, if their first steps promise these odds.
     pub(crate) fn others(
         &self,

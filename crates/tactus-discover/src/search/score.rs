@@ -25,7 +25,7 @@
 //! J. Hemerik, J. J. Goeman and L. Finos, *J. R. Stat. Soc. B* 82 (2020) 841 (sign-flipped scores); P. H. Westfall and
 //! S. S. Young, *Resampling-Based Multiple Testing* (1993), ch. 2 (the largest of many).
 
-use nalgebra::{DMatrix, DVectorView};
+use nalgebra::DMatrix;
 
 use crate::fit::Grams;
 use crate::numbers::{Rng, median, of_picked, parallel};
@@ -37,6 +37,8 @@ const CLIP: f64 = 4.0;
 /// Least number of blocks from which the excess scatter is estimated, and the excess assumed for fewer.
 const BLOCKS_LEAST: usize = 8;
 const EXCESS_OF_FEW: f64 = 1.5;
+/// Number of directions whose flipped sums are one product of matrices: their parts stay in the cache.
+const PANEL: usize = 256;
 
 /// The score of one direction, or of several orthonormal ones together.
 #[derive(Debug, Clone)]
@@ -159,16 +161,6 @@ impl Score {
         Self { z: of_picked(self.z, among), ..self }
     }
 
-    /// Its value after a flip of the blocks' signs.
-    fn flipped(&self, signs: &[f32]) -> f64 {
-        let square = |parts: &Vec<f32>| {
-            let signs = DVectorView::from_slice(&signs[..parts.len()], parts.len());
-            f64::from(DVectorView::from_slice(parts, parts.len()).dot(&signs)).powi(2)
-        };
-        let ChiSquare { times, freedom } = self.chi_square;
-        deviate(self.parts.iter().map(square).sum::<f64>() / times, freedom)
-    }
-
     /// The score of a sum of products of pairs of blocks, which is positive for any signs. Flips do not change the products of
     /// a block with itself; the others give the variance (F. E. Satterthwaite, *Biometrics Bull.* 2 (1946) 110).
     pub(crate) fn of_products(products: &DMatrix<f64>, blocks: &[usize], all_blocks: usize) -> Self {
@@ -216,24 +208,82 @@ fn deviate(chi_square: f64, freedom: f64) -> f64 {
 
 /// For each group, the largest of its scores in each of many sign-flipped data sets.
 pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Vec<f64>> {
-    let blocks =
-        groups.iter().flatten().flat_map(|score| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
+    let scores: Vec<(usize, &Score)> = groups
+        .iter()
+        .enumerate()
+        .flat_map(|(group, scores)| scores.iter().map(move |score| (group, *score)))
+        .collect();
+    let blocks = scores.iter().flat_map(|(_, score)| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
+    let signs = signs(blocks, flips, seed);
+    let mut largest = vec![vec![0.0; flips]; groups.len()];
+    for of_panel in parallel::map(&panels(&scores), |panel| largest_of(panel, &signs)) {
+        for (group, values) in of_panel {
+            raise(&mut largest[group], values);
+        }
+    }
+    largest
+}
+
+/// Signs of blocks (rows) in each flip (columns).
+fn signs(blocks: usize, flips: usize, seed: u64) -> DMatrix<f32> {
     let mut rng = Rng::new(seed);
-    let mut signs = vec![1.0_f32; flips * blocks];
-    for chunk in signs.chunks_mut(blocks.max(1)).flat_map(|flip| flip.chunks_mut(64)) {
+    let mut signs = DMatrix::from_element(blocks, flips, 1.0_f32);
+    for chunk in signs.as_mut_slice().chunks_mut(blocks.max(1)).flat_map(|flip| flip.chunks_mut(64)) {
         let bits = rng.bits();
         for (place, sign) in chunk.iter_mut().enumerate() {
             *sign = if bits >> place & 1 == 1 { 1.0 } else { -1.0 };
         }
     }
-    let largest = |group: &Vec<&Score>| -> Vec<f64> {
-        let of_flip = |flip: usize| {
-            let signs = &signs[flip * blocks..(flip + 1) * blocks];
-            group.iter().map(|score| score.flipped(signs)).fold(0.0, f64::max)
-        };
-        (0..flips).map(of_flip).collect()
-    };
-    parallel::map(groups, largest)
+    signs
+}
+
+/// Divides scores among panels with as many directions as one product of matrices takes.
+fn panels<'a, 'b>(scores: &'a [(usize, &'b Score)]) -> Vec<&'a [(usize, &'b Score)]> {
+    let mut panels = Vec::new();
+    let (mut first, mut directions) = (0, 0);
+    for (index, (_, score)) in scores.iter().enumerate() {
+        if directions + score.parts.len() > PANEL && index > first {
+            panels.push(&scores[first..index]);
+            (first, directions) = (index, 0);
+        }
+        directions += score.parts.len();
+    }
+    panels.push(&scores[first..]);
+    panels
+}
+
+/// The largest score of each group of a panel in each flip.
+fn largest_of(panel: &[(usize, &Score)], signs: &DMatrix<f32>) -> Vec<(usize, Vec<f64>)> {
+    let directions = panel.iter().flat_map(|(_, score)| &score.parts);
+    let mut parts = DMatrix::zeros(directions.clone().count(), signs.nrows());
+    for (direction, of_blocks) in directions.enumerate() {
+        for (block, part) in of_blocks.iter().enumerate() {
+            parts[(direction, block)] = *part;
+        }
+    }
+    let sums = parts * signs;
+    let mut largest: Vec<(usize, Vec<f64>)> = Vec::new();
+    let mut first = 0;
+    for (group, score) in panel {
+        let own = sums.rows(first, score.parts.len());
+        first += score.parts.len();
+        let values = own.column_iter().map(|sums| {
+            let squares = sums.iter().map(|sum| f64::from(*sum).powi(2)).sum::<f64>();
+            deviate(squares / score.chi_square.times, score.chi_square.freedom)
+        });
+        match largest.last_mut().filter(|(last, _)| last == group) {
+            Some((_, of_group)) => raise(of_group, values),
+            None => largest.push((*group, values.collect())),
+        }
+    }
+    largest
+}
+
+/// Raises each value to the other in its place if that is larger.
+fn raise(values: &mut [f64], others: impl IntoIterator<Item = f64>) {
+    for (value, other) in values.iter_mut().zip(others) {
+        *value = value.max(other);
+    }
 }
 
 /// The largest of all groups in each flipped data set.

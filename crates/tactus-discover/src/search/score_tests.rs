@@ -38,6 +38,41 @@ fn gains_of_one_sign_are_significant_and_gains_of_both_are_not() {
     assert!(sign_flip_p(&both, 1999, 1) > 0.3);
 }
 
+/// Scores of one direction and of three, in one panel and over the edge of the next.
+#[test]
+fn the_largest_of_a_group_is_that_of_its_scores_one_by_one() {
+    const FLIPS: usize = 39;
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut score = |directions: usize, blocks: usize| {
+        let mut draw = || -> Vec<f64> { (0..blocks).map(|_| rng.random_range(0.1..1.0)).collect() };
+        Score::of((0..directions).map(|_| standardised(&draw(), &draw())).collect())
+    };
+    let groups: Vec<Vec<Score>> = vec![
+        (0..super::PANEL).map(|_| score(1, 20)).collect(),
+        (0..7).map(|_| score(3, 17)).collect(),
+        Vec::new(),
+        vec![score(super::PANEL + 5, 20), score(0, 20)],
+    ];
+    let borrowed: Vec<Vec<&Score>> = groups.iter().map(|group| group.iter().collect()).collect();
+    let largest = flipped(&borrowed, FLIPS, 5);
+    let signs = super::signs(20, FLIPS, 5);
+    for (group, largest) in groups.iter().zip(&largest) {
+        for (flip, largest) in largest.iter().enumerate() {
+            let of_score = |score: &Score| {
+                let signs = signs.column(flip);
+                let sum = |parts: &Vec<f32>| -> f64 {
+                    parts.iter().zip(&signs).map(|(part, sign)| f64::from(*part) * f64::from(*sign)).sum()
+                };
+                let squares = score.parts.iter().map(|parts| sum(parts).powi(2)).sum();
+                deviate(squares, score.parts.len() as f64)
+            };
+            let one_by_one = group.iter().map(of_score).fold(0.0, f64::max);
+            assert!((largest - one_by_one).abs() < 1e-4, "flip {flip}: {largest}, not {one_by_one}");
+        }
+    }
+    assert!(largest[0].iter().any(|value| *value > 1.0), "{largest:?}");
+}
+
 /// Residuals without any effect, and the pair of elements that they suggest most. Each residual is noise; the signals are not.
 #[test]
 fn the_best_of_many_pairs_is_significant_no_more_often_than_its_level_says() {

@@ -4,38 +4,8 @@ use tactus_schema::table::{Phase, RowView};
 
 use super::*;
 use crate::fixtures::{ELEMENTS, ShippedRig, found, known, measured, processes};
-use crate::{Floor, Frames, discover};
-
-/// Effects were named, a test rejects the base model, and none the grown one.
-const NAMED: Evidence =
-    Evidence { is_named: true, is_missing: true, is_left: false, upper_noise: 1.9, tolerance_noise: 0.0 };
-
-#[test]
-fn names_explain_if_no_test_rejects_and_less_than_twice_the_noise_is_left() {
-    assert_eq!(NAMED.verdict(), Verdict::Explained);
-    assert_eq!(Evidence { is_left: true, ..NAMED }.verdict(), Verdict::PartlyExplained);
-    assert_eq!(Evidence { upper_noise: 2.1, ..NAMED }.verdict(), Verdict::PartlyExplained);
-    assert_eq!(Evidence { is_left: true, upper_noise: 0.4, ..NAMED }.verdict(), Verdict::Explained);
-    let tolerable = Evidence { is_left: true, upper_noise: 30.0, tolerance_noise: 31.0, ..NAMED };
-    assert_eq!(tolerable.verdict(), Verdict::Explained);
-    assert_eq!(Evidence { tolerance_noise: 29.0, ..tolerable }.verdict(), Verdict::PartlyExplained);
-}
-
-/// Nine tenths of the variance of a gap of ten times the noise leave three times the noise: 32 % of the rms.
-#[test]
-fn no_share_of_the_gap_explains() {
-    let upper_noise = 10.0 * (1.0_f64 - 0.9).sqrt();
-    assert_eq!(Evidence { upper_noise, ..NAMED }.verdict(), Verdict::PartlyExplained);
-}
-
-#[test]
-fn without_names_nothing_is_missing_only_if_more_than_twice_the_noise_would_show() {
-    let unnamed = Evidence { is_named: false, is_missing: false, ..NAMED };
-    assert_eq!(unnamed.verdict(), Verdict::NothingMissing);
-    assert_eq!(Evidence { upper_noise: 2.1, ..unnamed }.verdict(), Verdict::CannotJudge);
-    assert_eq!(Evidence { upper_noise: f64::INFINITY, ..unnamed }.verdict(), Verdict::CannotJudge);
-    assert_eq!(Evidence { is_missing: true, ..unnamed }.verdict(), Verdict::Unexplained);
-}
+use crate::verdict::held_out::SEEN_NOISE;
+use crate::{Floor, Frames, Rule, discover};
 
 /// The deepest frame of each press, as in a table of averaged presses. Each element is pressed this many times.
 fn one_frame_a_press(repeats: usize, noise_counts: f64) -> Frames {
@@ -109,16 +79,4 @@ fn runs_of_one_rig_may_differ_in_gain_and_zeros() {
     let [one, other] = found.grown.run_gains[..] else { panic!("two runs: {:?}", found.grown.run_gains) };
     assert!((other / one - 1.02).abs() < 1e-3, "{other} / {one}");
     assert!((one * other - 1.0).abs() < 1e-9, "the mean is 1: {one} {other}");
-}
-
-/// Two blocks cannot give less than a quarter, and do so if both gain.
-#[test]
-fn few_blocks_confirm_what_all_of_them_show() {
-    let step = |folds_p_value: f64, blocks: f64| Step {
-        added: AddedEffect { folds_p_value, ..coarse(1.0, 1.0, 1.0) },
-        least_p: 0.5_f64.powf(blocks),
-    };
-    assert!(step(0.26, 2.0).is_confirmed() && !step(0.5, 2.0).is_confirmed());
-    assert!(step(0.52, 1.0).is_confirmed() && !step(1.0, 1.0).is_confirmed());
-    assert!(step(0.04, 20.0).is_confirmed() && !step(0.06, 20.0).is_confirmed());
 }

@@ -46,6 +46,11 @@ pub struct DraftedEffect {
 }
 
 impl DraftedEffect {
+    /// True if another one acts on the same by the same.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        self.draft.carrier == other.draft.carrier && self.draft.covariates[0] == other.draft.covariates[0]
+    }
+
     /// True if it closes less than 70 % of what was left.
     pub fn is_partial(&self) -> bool {
         self.closed.is_none_or(|closed| closed.share < CLOSED_LEAST)
@@ -57,6 +62,8 @@ impl DraftedEffect {
 pub(super) struct Drafting {
     pub(super) draft: Option<Result<Box<DraftedEffect>, NoDraft>>,
     pub(super) model: Option<DraftModel>,
+    /// That model as it was fitted.
+    pub(super) at: Option<Fitted>,
 }
 
 /// A grown model, and what is known of what it leaves.
@@ -105,7 +112,7 @@ pub(super) fn drafted(
         Ok(found) => *found,
         // Names explain all that matters, and nothing describes the rest better.
         Err(_) if verdict == Verdict::Explained => return Ok(Drafting::default()),
-        Err(none) => return Ok(Drafting { draft: Some(Err(none)), model: None }),
+        Err(none) => return Ok(Drafting { draft: Some(Err(none)), ..Drafting::default() }),
     };
     if verdict == Verdict::Explained {
         // A second covariate may bring it to another stage.
@@ -137,7 +144,7 @@ pub(super) fn drafted(
         base: super::conclude::base_of(prepared, &at.parameters),
         effects: at.parameters.effects()?,
     };
-    Ok(Drafting { draft: Some(Ok(Box::new(found))), model })
+    Ok(Drafting { draft: Some(Ok(Box::new(found))), model, at: Some(at) })
 }
 
 /// What a new measurement says of a draft.

@@ -1,4 +1,5 @@
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -6,7 +7,7 @@ use tactus_model::effect::{Carrier, PipelineStage, When};
 use tactus_model::{Covariate, Effect};
 
 use crate::fixtures::{ELEMENTS, found, known, measured, processes};
-use crate::{Discovery, DraftedEffect, Frames, Known, NoDraft, Verdict, confirm};
+use crate::{Because, Discovery, DraftedEffect, Frames, GivenUp, Known, NoDraft, Verdict, confirm};
 
 /// Independent noise of one count, nearly white.
 fn noise(seed: u64) -> Vec<Vec<f64>> {
@@ -55,11 +56,21 @@ fn droop(sum_counts: f64) -> f64 {
     -0.15 * (sum_counts / 6000.0).powi(2)
 }
 
+fn sags(rises: &[f64], element: usize) -> f64 {
+    rises[element] * droop(rises.iter().sum())
+}
+
+/// A rig whose supply sags, its frames and what is found in them.
+static SAGGING: LazyLock<(Known, Frames, Discovery)> = LazyLock::new(|| {
+    let (known, frames) = with(|rises, _, element| sags(rises, element));
+    let found = found(&known, &frames);
+    (known, frames, found)
+});
+
 #[test]
 fn a_supply_that_sags_is_drafted_as_a_share_of_the_signal_by_the_sum() {
-    let (known, frames) = with(|rises, _, element| rises[element] * droop(rises.iter().sum()));
-    let found = found(&known, &frames);
-    let drafted = drafted(&found);
+    let (_, _, found) = &*SAGGING;
+    let drafted = drafted(found);
     let draft = &drafted.draft;
     assert_eq!((draft.carrier, draft.stage()), (Carrier::OwnSignal, PipelineStage::Element), "{draft:?}");
     assert_eq!(draft.covariates, [Covariate::SumOfSignals], "{draft:?}");
@@ -150,25 +161,39 @@ fn nothing_is_drafted_where_nothing_is_missing() {
 
 #[test]
 fn a_draft_in_the_library_is_found_by_its_name_and_leaves_nothing_to_draft() {
-    let (known, frames) = with(|rises, _, element| rises[element] * droop(rises.iter().sum()));
-    let first = found(&known, &frames);
-    let definition = drafted(&first).draft.clone().define().unwrap();
-    let with_draft = Known { drafts: vec![definition], ..known };
-    let second = found(&with_draft, &frames);
+    let (known, frames, first) = &*SAGGING;
+    let definition = drafted(first).draft.clone().define().unwrap();
+    let with_draft = Known { drafts: vec![definition], ..known.clone() };
+    let second = found(&with_draft, frames);
     assert_eq!(names(&second), ["draft-1"]);
     assert!(second.draft.is_none() || second.draft == Some(Err(NoDraft::Noise)), "{:?}", second.draft);
 }
 
 #[test]
 fn new_data_confirm_a_draft_that_holds_and_refute_one_that_does_not() {
-    let sags = |rises: &[f64], _: f64, element: usize| rises[element] * droop(rises.iter().sum());
-    let (known, frames) = with(sags);
-    let definition = drafted(&found(&known, &frames)).draft.clone().define().unwrap();
-    let of = |frames: &Frames| confirm(&known, frames, definition, 1).unwrap();
-    let again = of(&with_noise(12, sags).1);
+    let (known, _, found) = &*SAGGING;
+    let definition = drafted(found).draft.clone().define().unwrap();
+    let of = |frames: &Frames| confirm(known, frames, definition, 1).unwrap();
+    let again = of(&with_noise(12, |rises, _, element| sags(rises, element)).1);
     assert!(again.holds() && (again.strength - 1.0).abs() < 0.1, "{again:?}");
-    let half = of(&with_noise(12, |rises, depth, element| 0.5 * sags(rises, depth, element)).1);
+    let half = of(&with_noise(12, |rises, _, element| 0.5 * sags(rises, element)).1);
     assert!(!half.holds() && (half.strength - 0.5).abs() < 0.1, "it is there, but not as strong: {half:?}");
     let none = of(&with_noise(12, |_, _, _| 0.0).1);
     assert!(!none.holds() && none.strength.abs() < 0.1, "{none:?}");
+}
+
+/// `heavy-tail` is tried first and follows a part of it.
+#[test]
+fn a_name_gives_way_to_what_is_drafted_without_it_and_explains_as_much() {
+    let (known, frames) = with(|rises, _, _| 0.01 * rises.iter().sum::<f64>());
+    let found = found(&known, &frames);
+    let draft = &drafted(&found).draft;
+    assert_eq!(
+        (draft.carrier, &*draft.covariates),
+        (Carrier::Counts, &[Covariate::SumOfSignals][..]),
+        "{draft:?}"
+    );
+    assert_eq!((names(&found), found.verdict), (vec![], Verdict::Unexplained));
+    let gave_way = GivenUp { effect: "heavy-tail", because: Because::Draft };
+    assert!(found.given_up.contains(&gave_way), "{:?}", found.given_up);
 }

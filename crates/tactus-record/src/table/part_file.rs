@@ -155,7 +155,7 @@ pub(super) fn column<T: DataType>(
     column.close()
 }
 
-/// Names and indices repeat, so they have dictionaries; times and positions do not. Counts of most sensors are whole
+/// Names and indices repeat, so they have dictionaries; times, positions and residuals do not. Counts of most sensors are whole
 /// numbers in a narrow range; otherwise the writer drops their dictionary by itself.
 fn properties() -> Result<WriterProperties, ParquetError> {
     let mut properties = WriterProperties::builder()
@@ -163,6 +163,10 @@ fn properties() -> Result<WriterProperties, ParquetError> {
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?));
     for column in ["t_ns", "x_mm", "y_mm", "z_mm"] {
         properties = properties.set_column_dictionary_enabled(ColumnPath::from(column), false);
+    }
+    for column in ["residual_before", "residual_after"] {
+        let path = [column, "list", "element"].map(String::from).to_vec();
+        properties = properties.set_column_dictionary_enabled(ColumnPath::from(path), false);
     }
     Ok(properties.build())
 }

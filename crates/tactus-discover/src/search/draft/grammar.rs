@@ -111,6 +111,7 @@ const IN_CONTACT: &[Group] = &[
 ];
 
 const ELSEWHERE: &[Group] = &[
+    (Carrier::PressHere, When::Always, &[Covariate::Height]),
     (Carrier::PressHere, When::OutOfContact, &[Covariate::Height]),
     (Carrier::PressHere, When::OnTheWayDown, &[Covariate::Height]),
     (Carrier::PressHere, When::OnTheWayUp, &[Covariate::Height]),

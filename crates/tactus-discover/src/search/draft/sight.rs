@@ -104,6 +104,10 @@ impl Sight {
     pub(super) fn knots(&self, of: Acting, count: usize) -> Vec<f64> {
         let mut values = self.values(of);
         values.sort_by(f64::total_cmp);
+        if let (_, When::Always, Covariate::Height) = of {
+            // It is 0 as long as the tool touches, in most frames.
+            values.dedup();
+        }
         let (Some(least), Some(most)) = (values.first().copied(), values.last().copied()) else {
             return Vec::new();
         };
