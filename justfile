@@ -452,21 +452,21 @@ stop-trials trials="200": build
     conditions=("1,000 connections" "disk hangs" "one core" "standard error unread" "rogue client" "in contact" "in homing" "no sensor")
     failed=0
     printf '%s\n' "${conditions[@]}" | TACTUS_TRIALS={{ trials }} xargs -P 3 -d '\n' -I{} bash -c \
-        'TACTUS_ROWS="{}" cargo test --workspace --test e2e stop_trials:: -- --nocapture > "target/stop-trials/{}.log" 2>&1' || failed=1
+        'TACTUS_ROWS="{}" cargo test --workspace --test trials stop_trials:: -- --nocapture > "target/stop-trials/{}.log" 2>&1' || failed=1
     grep -hE '^(condition|[a-z1].* [0-9]+\.[0-9]$)|not measured|later than|panicked' target/stop-trials/*.log | awk '!shown[$0]++'
     exit $failed
 
 # STOP at each surface after a disk has hung for a minute; some ten minutes. As root.
 hung-disk: build
-    TACTUS_TRIALS=1 TACTUS_HANG_S=60 TACTUS_ROWS="disk hangs" cargo test --workspace --test e2e stop_trials:: -- --nocapture
+    TACTUS_TRIALS=1 TACTUS_HANG_S=60 TACTUS_ROWS="disk hangs" cargo test --workspace --test trials stop_trials:: -- --nocapture
 
 # kill -9 at so many random instants of a run in real time; TACTUS_SEED chooses others.
 kill-trials trials="200": build
-    TACTUS_TRIALS={{ trials }} cargo test --workspace --test e2e kill_trials:: -- --nocapture
+    TACTUS_TRIALS={{ trials }} cargo test --workspace --test trials kill_trials:: -- --nocapture
 
 # The service in real time with runs and a subscriber: memory, frames, clock.
 soak hours="1": build
-    TACTUS_SOAK_HOURS={{ hours }} cargo test --workspace --test e2e soak:: -- --nocapture
+    TACTUS_SOAK_HOURS={{ hours }} cargo test --workspace --test trials soak:: -- --nocapture
 
 # Hosts as network namespaces, joined by a stock zenohd, with a cable that is down for half a minute; some four minutes. As root; the first
 # time it builds zenohd.

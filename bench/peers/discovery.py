@@ -24,6 +24,7 @@ import argparse
 import json
 import multiprocessing
 import platform
+import resource
 import time
 import warnings
 from functools import partial
@@ -97,11 +98,13 @@ def reported(folder, name):
         if ran.exists():
             continue
         data = data or Data(folder, name)
-        started = time.perf_counter()
+        started, processor_s = time.perf_counter(), time.process_time()
         report = work(data)
-        seconds = time.perf_counter() - started
+        costs = {"seconds": time.perf_counter() - started, "processor_s": time.process_time() - processor_s}
+        # Of this process until now: it has worked on other sets with other methods before.
+        costs["peak_mib"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         write(folder / "peers" / method / "reports" / f"{name}.json", report)
-        write(ran, {"program": method, "seconds": seconds, "exit": 0, "said": ""})
+        write(ran, {"program": method, **costs, "exit": 0, "said": ""})
     return name
 
 

@@ -81,6 +81,8 @@ struct Play {
     z_mm: Option<f64>,
     z_at_frame_mm: Option<f64>,
     frame: Option<MonoTime>,
+    /// For each element of the last frame, when it was last read.
+    read: Vec<Option<MonoTime>>,
     excused: Option<MonoTime>,
     depth_max_mm: f64,
     has_zero: bool,
@@ -110,6 +112,7 @@ impl Play {
             z_mm: None,
             z_at_frame_mm: None,
             frame: None,
+            read: Vec::new(),
             excused: None,
             depth_max_mm: service.envelope.depth_max_mm(RIG.covering),
             has_zero: false,
@@ -249,6 +252,10 @@ impl Play {
         if (0..counts.len()).any(|e| counts[e].is_finite() && is_read(e) && !unwatched.contains(&e)) {
             self.frame = Some(received);
         }
+        self.read.resize(counts.len(), None);
+        for element in (0..counts.len()).filter(|e| counts[*e].is_finite() && is_read(*e)) {
+            self.read[element] = Some(received);
+        }
         self.z_at_frame_mm = self.z_mm;
         self.told(violation.as_ref());
         // Without a zero each element is held against the rig file's baseline.
@@ -369,11 +376,11 @@ impl Play {
             return;
         }
         let envelope = &self.service.envelope;
-        for (counts, baseline_counts) in counts.iter().zip(&RIG.baseline_counts) {
+        for (element, (counts, baseline_counts)) in counts.iter().zip(&RIG.baseline_counts).enumerate() {
             let away_counts = (counts - baseline_counts).abs();
             // An element that was not read has no zero, and its number says nothing.
             let is_zero = away_counts <= envelope.baseline_band_counts || !counts.is_finite();
-            assert!(is_zero || self.frame.is_some(), "{counts} counts are no zero");
+            assert!(is_zero || self.is_silent_element(element), "{counts} counts are no zero");
         }
         self.has_zero |= is_reference && counts.iter().any(|counts| counts.is_finite());
     }
@@ -485,6 +492,12 @@ impl Play {
 
     fn is_fresh(&self) -> bool {
         seconds_since(self.now, self.frame) <= self.silence_max_s()
+    }
+
+    /// True if frames have come for long without this element.
+    fn is_silent_element(&self, element: usize) -> bool {
+        let last_frame = self.frame.unwrap_or_default();
+        self.read.get(element).is_some_and(|read| seconds_since(last_frame, *read) > self.silence_max_s())
     }
 
     fn silence_max_s(&self) -> f64 {

@@ -11,13 +11,11 @@ use std::time::Duration;
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{Link, Process, binary, free_endpoint, repository, tactus, until};
+use tactus_e2e::{Link, Process, binary, free_endpoint, repository, tactus, until, within};
 use tactus_record::{Entry, Message, Timeline};
 use tactus_schema::pb::run_event::Event;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
-
-use crate::bench::within;
 
 /// Time between two looks at files that grow.
 const AGAIN: Duration = Duration::from_millis(100);

@@ -6,13 +6,11 @@ use std::path::Path;
 
 use serde_json::Value;
 use tactus_bus::{Client, Endpoint, History, Subscription};
-use tactus_e2e::{CommandOutput, Process, free_endpoint, repository, tactus};
+use tactus_e2e::{CommandOutput, Process, free_endpoint, repository, small_rig, tactus, within};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
-
-use crate::bench::{small_rig, within};
 
 /// Frames that the tests see before and after a rig dies.
 const FRAMES: usize = 15;

@@ -10,14 +10,12 @@ use std::time::Duration;
 
 use prost::Message as _;
 use serde_json::{Value, json};
-use tactus_e2e::{Process, ServiceUnderTest, free_endpoint};
+use tactus_e2e::{Process, ServiceUnderTest, free_endpoint, raw_session, within};
 use tactus_schema::key::{Keys, Topic};
 use tactus_schema::pb;
 use tokio::runtime::Runtime;
 use tokio::time::interval;
 use zenoh::bytes::Encoding;
-
-use crate::bench::{raw_session, within};
 
 const HOLD: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 600.0)\n";
 

@@ -4,6 +4,7 @@
 //! answer or an exit, with a deadline that only a hang can reach.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot go on says why and fails")]
 
+mod bus;
 mod link;
 mod tap;
 mod terminal;
@@ -26,6 +27,7 @@ use rustix::pty::{OpenptFlags, openpt, ptsname, unlockpt};
 use serde_json::Value;
 use tempfile::TempDir;
 
+pub use bus::{raw_session, within};
 pub use link::Link;
 pub use tap::{Tap, Way};
 pub use terminal::Terminal;
@@ -573,3 +575,31 @@ const FIRST_PORT: u32 = 10_000;
 
 /// Number of ports from it, all below those that Linux gives to connections.
 const PORTS: u32 = 22_000;
+
+/// The shipped rig with little travel, so that homing and ways are short, and a slow sensor.
+///
+/// # Panics
+/// If the shipped rig has become another one.
+pub fn small_rig() -> String {
+    let rig = fs::read_to_string(repository("config/rigs/pty.toml")).expect("the shipped rig");
+    let changes = [
+        ("x_mm = [10.0, 50.0]", "x_mm = [18.0, 32.0]"),
+        ("y_mm = [10.0, 40.0]", "y_mm = [13.0, 27.0]"),
+        ("z_max_mm = 30.0", "z_max_mm = 4.0"),
+        // A busy machine may need longer than three periods of the shipped rate for a frame, which is a safety stop.
+        ("rate_hz = 30.0", "rate_hz = 10.0"),
+        ("[[0.0, 60.0], [0.0, 50.0], [-6.0, 30.0]]", "[[18.0, 32.0], [13.0, 27.0], [-6.0, 4.0]]"),
+    ];
+    changed(rig, &changes)
+}
+
+/// A rig file with other texts in the place of some of its own.
+///
+/// # Panics
+/// If the file lacks one of them.
+pub fn changed(rig: String, changes: &[(&str, &str)]) -> String {
+    changes.iter().fold(rig, |rig, (usual, other)| {
+        assert!(rig.contains(usual), "the rig lacks {usual}");
+        rig.replace(usual, other)
+    })
+}

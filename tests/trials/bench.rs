@@ -1,6 +1,5 @@
 //! A virtual rig with a tap on each of its lines, a service that restarts, and a client that commands it: for the tests that
 //! repeat one thing many times.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::env;
 use std::fs;
@@ -13,13 +12,12 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use tactus_bus::{BusError, Client, Endpoint, HeldLease, History, Hold, Published, Subscription};
-use tactus_e2e::{DEADLINE, Process, Tap, Way, free_endpoint, repository};
+use tactus_e2e::{DEADLINE, Process, Tap, Way, free_endpoint, small_rig, within};
 use tactus_schema::key::Command;
 use tactus_schema::pb;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 use tokio::task::JoinHandle;
-use tokio::time::timeout;
 
 /// Name of the rig.
 pub(crate) const RIG: &str = "bench";
@@ -39,24 +37,6 @@ pub(crate) fn trials() -> Option<usize> {
 pub(crate) fn number<T: std::str::FromStr>(name: &str) -> Option<T> {
     let text = env::var(name).ok()?;
     Some(text.parse().unwrap_or_else(|_| panic!("{name}={text:?} is no number")))
-}
-
-/// The shipped rig with little travel, so that homing and ways are short, and a slow sensor.
-pub(crate) fn small_rig() -> String {
-    let rig = fs::read_to_string(repository("config/rigs/pty.toml")).unwrap();
-    let mut small = rig.clone();
-    for (shipped, small_one) in [
-        ("x_mm = [10.0, 50.0]", "x_mm = [18.0, 32.0]"),
-        ("y_mm = [10.0, 40.0]", "y_mm = [13.0, 27.0]"),
-        ("z_max_mm = 30.0", "z_max_mm = 4.0"),
-        // A busy machine may need longer than three periods of the shipped rate for a frame, which is a safety stop.
-        ("rate_hz = 30.0", "rate_hz = 10.0"),
-        ("[[0.0, 60.0], [0.0, 50.0], [-6.0, 30.0]]", "[[18.0, 32.0], [13.0, 27.0], [-6.0, 4.0]]"),
-    ] {
-        assert!(small.contains(shipped), "the shipped rig lacks {shipped}");
-        small = small.replace(shipped, small_one);
-    }
-    small
 }
 
 /// What passes on the stage's line.
@@ -444,20 +424,6 @@ impl StageLine {
     pub(crate) fn forget(&self) {
         while self.seen.try_recv().is_ok() {}
     }
-}
-
-/// Waits for what a future gives; only a hang takes as long as the deadline.
-pub(crate) fn within<T>(runtime: &Runtime, future: impl Future<Output = T>) -> T {
-    runtime.block_on(async { timeout(DEADLINE, future).await }).unwrap()
-}
-
-/// A plain client of the bus.
-pub(crate) async fn raw_session(endpoint: &str) -> zenoh::Session {
-    let mut config = zenoh::Config::default();
-    config.insert_json5("mode", "\"client\"").unwrap();
-    config.insert_json5("scouting/multicast/enabled", "false").unwrap();
-    config.insert_json5("connect/endpoints", &format!("[\"{endpoint}\"]")).unwrap();
-    zenoh::open(config).await.unwrap()
 }
 
 /// A controller's report, `<Idle|MPos:1.000,2.000,-0.300|...>`.

@@ -1,13 +1,5 @@
 //! The service in real time for as long as `TACTUS_SOAK_HOURS` says, with a subscriber and runs without a pause: its memory,
 //! its frames, its clock. `just soak 1` plays an hour; without the variable it is a few seconds.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a test that cannot go on fails; a measurement is printed"
-)]
 
 use std::fs;
 use std::sync::{Arc, Mutex};

@@ -4,14 +4,6 @@
 //! Without it there is one trial of each surface under the first three conditions, and no time limit. `TACTUS_ROWS=contact`
 //! plays the rows with that text only. `TACTUS_HANG_S=60` says how long a disk that hangs has done so when the stop comes, as
 //! `just hung-disk` does; without it, it is up to 0.72 s.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a test that cannot go on fails; a measurement is printed"
-)]
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream, UdpSocket};
@@ -22,12 +14,12 @@ use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use tactus_bus::BusError;
-use tactus_e2e::{Process, free_endpoint};
+use tactus_e2e::{Process, changed, free_endpoint, raw_session, small_rig, within};
 use tactus_schema::key::Command;
 use tactus_schema::pb;
 use tokio::task::JoinHandle;
 
-use crate::bench::{Bench, Options, Seen, number, raw_session, small_rig, trials, within};
+use crate::bench::{Bench, Options, Seen, number, trials};
 use crate::disk::Disk;
 
 /// A run takes its own first zero; another tare would only take time.
@@ -185,19 +177,15 @@ fn a_stop_reaches_the_stage_from_every_surface_and_under_every_fault() {
 
 /// The bench's rig with short and quick ways: eleven thousand trials take their time.
 fn quick_rig() -> String {
-    let mut rig = small_rig();
-    for (usual, quick) in [
+    let changes = [
         ("safe_height_mm = 2.0", "safe_height_mm = 0.6"),
         ("rate_hz = 10.0", "rate_hz = 30.0"),
         ("z_max_mm = 4.0", "z_max_mm = 2.0"),
         ("[-6.0, 4.0]", "[-6.0, 2.0]"),
         ("travel_speed_mm_per_s = 20.0", "travel_speed_mm_per_s = 50.0"),
         ("load_speed_mm_per_s = 1.0", "load_speed_mm_per_s = 5.0"),
-    ] {
-        assert!(rig.contains(usual), "the bench's rig lacks {usual}");
-        rig = rig.replace(usual, quick);
-    }
-    rig
+    ];
+    changed(small_rig(), &changes)
 }
 
 /// A bench in one of the conditions, and who can stop it.

@@ -1,13 +1,5 @@
 //! A disk that hangs, in the place of the recordings: an ext4 file system in a file, frozen with `fsfreeze`. It needs root and loop
 //! devices; without them these tests say so and pass.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a test that cannot go on fails; a measurement is printed"
-)]
 
 use std::path::PathBuf;
 use std::process::Command;

@@ -1,14 +1,6 @@
 //! kill -9 of the service at random instants of a real-time run, from homing to the closing of its recording.
 //!
 //! `TACTUS_TRIALS=200` says how many; `just kill-trials` plays them. `TACTUS_SEED` chooses other instants.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a test that cannot go on fails; a measurement is printed"
-)]
 
 use std::path::Path;
 use std::time::{Duration, Instant};
