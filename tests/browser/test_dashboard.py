@@ -127,10 +127,9 @@ def test_stop_has_a_key_and_a_reset_asks_for_confirmation(lab, dashboard):
     expect(page.locator("#answer")).to_have_text("reset: done", timeout=PATIENCE_MS)
 
 
-def test_a_page_without_the_token_looks_and_stops(lab, dashboard):
-    page = dashboard
-    page.evaluate("sessionStorage.clear()")
-    page.reload()
+def test_a_page_without_the_token_looks_and_stops(lab, open_page):
+    page = open_page(go=False)
+    page.goto(page.url_with_token.partition("#")[0])
     loaded(page)
     expect(page.locator("#obstacle")).to_contain_text("can look and stop only")
     for name in ("#pause", "#resume", "#reset"):
