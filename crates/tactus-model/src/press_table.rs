@@ -2,6 +2,7 @@
 
 mod field;
 mod layers;
+mod products;
 
 use crate::{Contact, Covering, ForwardModel, Indenter};
 use layers::Layers;
@@ -21,7 +22,7 @@ use layers::Layers;
 /// underside one depth. An image takes 16 to 192 multiplications per element, for any mesh.
 ///
 /// Accuracy: within 5e-5 of the greatest rise of [`ForwardModel::image`], for elements no larger than the blur's `sigma`
-/// (the tests and benchmarks print it). Values are `f32`.
+/// (the tests and benchmarks print it). Values are `f32`; their last bits depend on the processor.
 ///
 /// ```
 /// use tactus_model::{Array, Covering, ForwardModel, Indenter, Psf, Response, PressTable};
