@@ -132,6 +132,7 @@ class Data:
         counts = np.stack(table["counts"].to_numpy())
         before = [name for name in residuals.column_names if "before" in name][0]
         self.residual = np.stack(residuals[before].to_numpy()).astype(float)
+        # What is known of a reading is the model's: a measured count holds the noise that its residual is made of.
         base = counts - self.residual
         self.press, self.t = column("press"), column("t_ns") * 1e-9
         self.base = base - np.median(base[self.press < 0], axis=0)
@@ -142,7 +143,7 @@ class Data:
         self.held, self.released = since(touched, self.t), since(~touched, self.t)
         self.past = np.maximum.accumulate(self.base, axis=0)
         self.at = np.stack([x - x.mean(), y - y.mean()], axis=1)
-        self.z, self.counts, self.pitch = z, counts.astype(float), rig["col_centres_mm"][1] - rig["col_centres_mm"][0]
+        self.z, self.counts, self.pitch = z, base, rig["col_centres_mm"][1] - rig["col_centres_mm"][0]
         self.height = np.where(touched, 0.0, z - np.quantile(z[touched], 0.98)).clip(0)
         known = "temperature_c" in table.column_names and column("temperature_c").astype(float)
         self.temperature = known if known is not False and np.isfinite(known).all() else None

@@ -4,8 +4,10 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use crate::lab::free_endpoint;
-use tactus_bus::{Bus, BusConfig, BusError, Calls, Client, Credentials, Endpoint, Hold, TlsConfig};
+use crate::lab::{Service, frame, free_endpoint, open_with};
+use tactus_bus::{
+    Bus, BusConfig, BusError, Calls, Client, Credentials, Endpoint, History, Hold, Lab, TlsConfig,
+};
 use tactus_schema::{
     key::{Command, Keys},
     pb,
@@ -122,4 +124,78 @@ async fn a_service_whose_reader_could_command_does_not_listen() {
     assert!(error.to_string().contains("could command"), "{error}");
     let gone = Client::connect_as(&endpoint, Some("bench"), &credentials("commander")).await;
     assert!(matches!(gone, Err(BusError::NoService { .. })), "{gone:?}");
+}
+
+/// The router of the how-to on several hosts, on this machine, with one of the certificates of these tests.
+async fn router(name: &str) -> (zenoh::Session, Endpoint) {
+    let page = include_str!("../../../../docs/book/how-to/hosts.md");
+    let (_, after) = page.split_once("```json5\n").unwrap();
+    let (settings, _) = after.split_once("```").unwrap();
+    loop {
+        let endpoint = endpoint();
+        let mut settings = settings.replacen("tls/0.0.0.0:7447", &endpoint.to_string(), 1);
+        for (shown, used) in [
+            ("lab-authority.pem", "lab-authority.pem".to_owned()),
+            ("router.pem", format!("{name}.pem")),
+            ("router.key", format!("{name}.key")),
+        ] {
+            assert!(settings.contains(shown), "{settings}");
+            settings = settings.replacen(&format!("\"{shown}\""), &format!("{:?}", file(&used)), 1);
+        }
+        if let Ok(session) = zenoh::open(zenoh::Config::from_json5(&settings).unwrap()).await {
+            return (session, endpoint);
+        }
+    }
+}
+
+/// A service that has joined the router and has published a frame.
+async fn joined(router: &Endpoint) -> Bus {
+    let config = BusConfig { connect: vec![router.clone()], tls: Some(tls()), ..BusConfig::default() };
+    let Service { bus, calls, .. } = open_with("bench", config).await;
+    answer(calls);
+    bus.publisher().publish_frame(&frame(7));
+    bus
+}
+
+/// A client at a router, which the service joins whenever it does.
+async fn at(router: &Endpoint) -> Client {
+    let visitor = credentials("visitor");
+    let mut lab = loop {
+        match Lab::connect(router, &visitor).await {
+            Ok(lab) => break lab,
+            // The router may take its time on a busy machine.
+            Err(BusError::Session { .. } | BusError::NoService { .. }) => {}
+            Err(error) => panic!("{error}"),
+        }
+    };
+    while !lab.rigs().iter().any(|found| found == "bench") {
+        lab.changed().await.unwrap();
+    }
+    lab.client("bench").await.unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_router_may_do_what_its_name_is_listed_for() {
+    for (name, commands) in [("commander", true), ("reader", false)] {
+        let (router, endpoint) = router(name).await;
+        let bus = joined(&endpoint).await;
+        let client = at(&endpoint).await;
+        let mut frames = client.subscribe::<pb::Frame>(History::All).await.unwrap();
+        assert_eq!(frames.recv().await.unwrap().seq, 7, "{name}");
+        assert!(client.command(Command::Status, &request(), PATIENCE).await.unwrap().ok, "{name}");
+        if commands {
+            assert_eq!(client.command(Command::Reset, &request(), PATIENCE).await.unwrap().version, "Reset");
+        } else {
+            let denied = client.command(Command::Reset, &request(), Duration::from_millis(100)).await;
+            assert!(matches!(denied, Err(BusError::NoAnswer { .. })), "{denied:?}");
+        }
+        // Nobody gets to the router without a certificate of the lab.
+        let nobody = Credentials { authority: Some(file("lab-authority.pem")), ..Credentials::default() };
+        for credentials in [nobody, credentials("stranger")] {
+            let denied = Client::connect_as(&endpoint, Some("bench"), &credentials).await;
+            assert!(matches!(denied, Err(BusError::Session { .. })), "{denied:?}");
+        }
+        bus.close().await.unwrap();
+        router.close().await.unwrap();
+    }
 }
