@@ -223,8 +223,11 @@ impl Sampling<'_> {
                     continue;
                 }
                 for (lane, value) in values.iter_mut().enumerate() {
-                    let of_spot = spots.sample::<C, N>(products, lane, table, layers.nodes[0], &channels);
-                    *value = f32::from_bits(of_spot.to_bits() & spots.inside[lane]);
+                    *value = if spots.inside[lane] == 0 {
+                        0.0
+                    } else {
+                        spots.sample::<C, N>(products, lane, table, layers.nodes[0], &channels)
+                    };
                 }
             }
         }
