@@ -3,6 +3,7 @@
 mod field;
 mod layers;
 mod products;
+mod sampling;
 
 use crate::{Contact, Covering, ForwardModel, Indenter};
 use layers::Layers;

@@ -1,5 +1,6 @@
 use super::super::products::Apart;
 use super::*;
+use crate::{Contact, Indenter};
 
 /// A processor without fused products gives the same images, but for the last bits.
 #[test]
