@@ -27,6 +27,8 @@ mod problem;
 mod random_walk;
 mod scale;
 mod sums;
+mod tiles;
+mod totals;
 
 pub(crate) use folds::{FoldsOf, gains_by_folds};
 pub(crate) use grams::Grams;

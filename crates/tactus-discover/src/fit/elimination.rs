@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::gains::GAIN_ERROR_MAX;
 use super::parameters::Parameters;
 use super::problem::Problem;
-use super::sums::{Block, Segments, Total};
+use super::totals::{Block, Segments, Total};
 use crate::numbers::parallel;
 
 /// A direction of which gains, baselines and the model's parameters fit all but this share is empty.

@@ -15,7 +15,8 @@ use nalgebra::DMatrix;
 
 use super::elimination::Elimination;
 use super::problem::{Fitted, Problem};
-use super::sums::{Border, Kept, Segments, Total};
+use super::tiles::Border;
+use super::totals::{Kept, Segments, Total};
 use crate::data::DiscoverError;
 
 /// A direction of which the fitted readings show less than this share is none that was estimated.

@@ -22,7 +22,8 @@ use super::knots::{bounded, is_of_run_time};
 use super::parameters::{Parameters, Term};
 use super::problem::{Fitted, Free, Problem, least_step};
 use super::scale::Scale;
-use super::sums::{Block, Kept, Segments, Total, add};
+use super::tiles::add;
+use super::totals::{Block, Kept, Segments, Total};
 use crate::data::DiscoverError;
 use crate::numbers::{NORMAL_PER_MEDIAN, median};
 

@@ -9,7 +9,8 @@ use nalgebra::DMatrix;
 use super::elimination::{Elimination, Parts};
 use super::parameters::Parameters;
 use super::problem::{Fitted, Problem};
-use super::sums::{Direction, Kept, Segments, with_more_gain};
+use super::sums::{Direction, with_more_gain};
+use super::totals::{Kept, Segments};
 use crate::data::DiscoverError;
 
 /// Products of directions at a model.

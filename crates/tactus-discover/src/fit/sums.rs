@@ -19,7 +19,8 @@ use nalgebra::DMatrix;
 use super::parameters::Parameters;
 use super::predictor::{Reached, Stream};
 use super::problem::Problem;
-use super::random_walk::is_random_walk;
+use super::tiles::{Alone, Readings, Sums};
+use super::totals::{Kept, Segments, Total};
 use crate::data::DiscoverError;
 use crate::numbers::parallel;
 
@@ -29,8 +30,6 @@ const CHUNK_BINS: [usize; 2] = [64, 256];
 const CHUNK_COLUMNS: usize = 32_768;
 /// Bins of which products are computed together: those of some hundred directions stay near the processor.
 const TILE_BINS: usize = 4;
-/// Directions whose products are computed together.
-const PANEL: usize = 128;
 /// Greatest number of blocks whose signs are flipped apart; more are joined.
 const BLOCKS_MAX: usize = 400;
 /// Step of the derivative by the gains.
@@ -78,58 +77,6 @@ impl Direction<'static> {
     }
 }
 
-/// Which products a pass keeps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kept {
-    /// Those of all directions, for steps of a fit.
-    All,
-    /// Also the part of each block.
-    AllAndBlocks,
-    /// Those of each direction with itself, with the model's own and with the residual; and the part of each block.
-    OwnAndBlocks,
-}
-
-/// Sums over all data.
-pub(super) struct Total {
-    /// Products of all directions, and of the residual as the last.
-    pub(super) products: DMatrix<f64>,
-    pub(super) segments: Vec<Border>,
-    pub(super) blocks: Vec<Block>,
-}
-
-/// Products with each element's baseline and gain.
-#[derive(Clone)]
-pub(super) struct Border {
-    /// Element by element, direction by direction.
-    pub(super) by_baseline: DMatrix<f64>,
-    pub(super) by_gain: DMatrix<f64>,
-    /// Of each element: baseline with itself, with gain, and gain with itself.
-    pub(super) own: Vec<[f64; 3]>,
-}
-
-/// What is kept of a block, in single precision: parts of a test's statistic.
-pub(super) struct Block {
-    number: usize,
-    /// Its first bin that is fitted.
-    pub(super) first_bin: usize,
-    pub(super) segment: usize,
-    /// Products of the model's own directions and the residual with all directions.
-    pub(super) rows: DMatrix<f32>,
-    pub(super) diagonal: Vec<f32>,
-    pub(super) by_baseline: DMatrix<f32>,
-    pub(super) by_gain: DMatrix<f32>,
-    pub(super) own: Vec<[f64; 3]>,
-}
-
-/// Stretches of time that have a baseline of their own: runs, or the parts of a walk.
-pub(super) struct Segments {
-    pub(super) of_bin: Vec<usize>,
-    /// The run of each.
-    pub(super) run: Vec<usize>,
-    /// Precision of the difference between neighbours of one run, in counts^-2; 0 without a walk.
-    pub(super) stiffness: f64,
-}
-
 /// A direction during a pass.
 enum Running<'a> {
     Towards {
@@ -161,45 +108,6 @@ enum Column {
     Every(Vec<f64>),
     /// Those at one element, bin by bin.
     One(usize, Vec<f64>),
-}
-
-/// Sums over bins of one segment.
-struct Sums {
-    segment: usize,
-    /// The directions that do something there: first those of all elements, in order, then those of one element each.
-    active: Vec<usize>,
-    /// Products of those: in the rows of the pivots and of the residual, and on the diagonal.
-    products: DMatrix<f64>,
-    border: Border,
-}
-
-/// A direction of one element that does something in a part of a chunk.
-struct Alone<'a> {
-    number: usize,
-    element: usize,
-    /// The place of the element among those that are weighed.
-    place: usize,
-    /// Bin by bin, of the whole chunk.
-    values: &'a [f64],
-}
-
-/// The weighed readings of some bins: bin by bin, element by element.
-struct Readings<'a> {
-    bins: &'a [usize],
-    /// The first bin of the chunk.
-    first_bin: usize,
-    per_bin: usize,
-    /// The roots of their weights, and the derivatives by the gains times those.
-    roots: &'a [f64],
-    gains: &'a [f64],
-}
-
-impl Readings<'_> {
-    /// The readings at which a direction of one element acts, with its values times the roots of the weights.
-    fn values(&self, of: &Alone<'_>) -> impl Iterator<Item = (usize, f64)> {
-        let at = (of.place..self.roots.len()).step_by(self.per_bin);
-        self.bins.iter().zip(at).map(|(bin, at)| (at, of.values[bin - self.first_bin] * self.roots[at]))
-    }
 }
 
 impl Problem<'_> {
@@ -454,215 +362,5 @@ impl Chunk {
             }
         }
         found
-    }
-}
-
-impl Sums {
-    /// Adds the products of a tile, a row a reading and a column a direction: of the first directions with those after them, panel by
-    /// panel, and of each other with itself and with the residual, which is the last if it is there. Of those that are the same both ways the
-    /// ones above the diagonal are computed.
-    fn take(&mut self, tile: &DMatrix<f64>, first: usize, has_residual: bool) {
-        let count = tile.ncols();
-        for start in (0..first).step_by(PANEL) {
-            let (rows, after) = (PANEL.min(first - start), count - start);
-            self.products.view_mut((start, start), (rows, after)).gemm(
-                1.0,
-                &tile.columns(start, rows).transpose(),
-                &tile.columns(start, after),
-                1.0,
-            );
-        }
-        for (place, column) in tile.column_iter().enumerate().skip(first) {
-            self.products[(place, place)] += column.norm_squared();
-            if has_residual && place + 1 < count {
-                self.products[(place, count - 1)] += column.dot(&tile.column(count - 1));
-            }
-        }
-    }
-
-    /// Adds the products of directions of one element each with those that are the first of a tile, with the residual and with themselves; also
-    /// those of one element with each other, if they are asked for.
-    fn take_alone(
-        &mut self,
-        of: &Readings<'_>,
-        tile: &DMatrix<f64>,
-        first: usize,
-        has_residual: bool,
-        of_one: &[Alone<'_>],
-        with_each_other: bool,
-    ) {
-        let of_all = tile.ncols();
-        let residual = has_residual.then(|| of_all - 1).filter(|residual| *residual >= first);
-        for (nth, alone) in of_one.iter().enumerate() {
-            let with = |others: &[f64]| of.values(alone).map(|(at, value)| value * others[at]).sum::<f64>();
-            self.border.by_baseline[(alone.element, alone.number)] += with(of.roots);
-            self.border.by_gain[(alone.element, alone.number)] += with(of.gains);
-            let place = of_all + nth;
-            for other in (0..first).chain(residual) {
-                let start = other * tile.nrows();
-                self.products[(other, place)] += with(&tile.as_slice()[start..start + tile.nrows()]);
-            }
-            for (other, another) in of_one.iter().enumerate().take(nth + 1) {
-                if other == nth || with_each_other && another.place == alone.place {
-                    let pairs = of.values(alone).zip(of.values(another));
-                    self.products[(of_all + other, place)] +=
-                        pairs.map(|((_, a), (_, b))| a * b).sum::<f64>();
-                }
-            }
-        }
-    }
-}
-
-impl Border {
-    /// Adds readings of a tile: of each, the root of its weight, the derivative by the gain and the directions that do something, times that
-    /// root.
-    fn take(&mut self, active: &[usize], weighed: &[usize], [roots, gains]: [&[f64]; 2], values: &[f64]) {
-        let per_bin = weighed.len().max(1);
-        let of_bins = || roots.chunks_exact(per_bin).zip(gains.chunks_exact(per_bin));
-        for (roots, gains) in of_bins() {
-            for ((element, root), gain) in weighed.iter().zip(roots).zip(gains) {
-                let [one, mixed, square] = &mut self.own[*element];
-                *one += root * root;
-                *mixed += root * gain;
-                *square += gain * gain;
-            }
-        }
-        let (mut by_baseline, mut by_gain) = (vec![0.0; per_bin], vec![0.0; per_bin]);
-        for (number, values) in active.iter().zip(values.chunks_exact(roots.len().max(1))) {
-            by_baseline.fill(0.0);
-            by_gain.fill(0.0);
-            for (values, (roots, gains)) in values.chunks_exact(per_bin).zip(of_bins()) {
-                for ((sum, value), root) in by_baseline.iter_mut().zip(values).zip(roots) {
-                    *sum += value * root;
-                }
-                for ((sum, value), gain) in by_gain.iter_mut().zip(values).zip(gains) {
-                    *sum += value * gain;
-                }
-            }
-            for ((element, of_baseline), of_gain) in weighed.iter().zip(&by_baseline).zip(&by_gain) {
-                self.by_baseline[(*element, *number)] += *of_baseline;
-                self.by_gain[(*element, *number)] += *of_gain;
-            }
-        }
-    }
-
-    fn new(count: usize, elements: usize) -> Self {
-        let zeros = || DMatrix::zeros(elements, count);
-        Self { by_baseline: zeros(), by_gain: zeros(), own: vec![[0.0; 3]; elements] }
-    }
-
-    fn add(&mut self, other: &Self) {
-        self.by_baseline += &other.by_baseline;
-        self.by_gain += &other.by_gain;
-        add(&mut self.own, &other.own);
-    }
-}
-
-pub(super) fn add(to: &mut [[f64; 3]], of: &[[f64; 3]]) {
-    for (to, of) in to.iter_mut().flatten().zip(of.iter().flatten()) {
-        *to += of;
-    }
-}
-
-impl Total {
-    pub(super) fn new(count: usize, elements: usize, segments: usize) -> Self {
-        Self {
-            products: DMatrix::zeros(count, count),
-            segments: vec![Border::new(count, elements); segments],
-            blocks: Vec::new(),
-        }
-    }
-
-    /// The sums over nothing, as many as these.
-    pub(super) fn none(&self) -> Self {
-        let elements = self.segments.first().map_or(0, |border| border.own.len());
-        Self::new(self.products.nrows(), elements, self.segments.len())
-    }
-
-    /// The sums with those over other data, without the parts of blocks.
-    pub(super) fn joined(mut self, other: &Self) -> Self {
-        self.products += &other.products;
-        self.segments.iter_mut().zip(&other.segments).for_each(|(to, of)| to.add(of));
-        self
-    }
-
-    /// Adds the sums over a part of a block; parts come in order of time.
-    fn add(&mut self, number: usize, first_bin: usize, own: usize, sums: &Sums, kept: Kept) {
-        for (place, column) in sums.active.iter().enumerate() {
-            for (row, product) in sums.active.iter().zip(sums.products.column(place).iter()) {
-                self.products[(*row, *column)] += product;
-            }
-        }
-        self.segments[sums.segment].add(&sums.border);
-        if kept == Kept::All {
-            return;
-        }
-        let elements = sums.border.own.len();
-        let is_other = |last: &Block| (last.number, last.segment) != (number, sums.segment);
-        if self.blocks.last().is_none_or(is_other) {
-            let of = Block::new([number, first_bin, sums.segment], own, self.products.ncols(), elements);
-            self.blocks.push(of);
-        }
-        if let Some(block) = self.blocks.last_mut() {
-            block.add(own, sums);
-        }
-    }
-}
-
-impl Block {
-    fn new([number, first_bin, segment]: [usize; 3], own: usize, count: usize, elements: usize) -> Self {
-        Self {
-            number,
-            first_bin,
-            segment,
-            rows: DMatrix::zeros(own + 1, count),
-            diagonal: vec![0.0; count],
-            by_baseline: DMatrix::zeros(elements, count),
-            by_gain: DMatrix::zeros(elements, count),
-            own: vec![[0.0; 3]; elements],
-        }
-    }
-
-    fn add(&mut self, own: usize, Sums { active, products, border, .. }: &Sums) {
-        let residual = self.rows.ncols() - 1;
-        #[expect(clippy::cast_possible_truncation, reason = "parts of a test's statistic")]
-        let single = |value: f64| value as f32;
-        let rows = |(_, number): &(usize, &usize)| **number < own || **number == residual;
-        for (place, number) in active.iter().enumerate().filter(rows) {
-            for (other, product) in active.iter().zip(products.row(place).iter()) {
-                self.rows[((*number).min(own), *other)] += single(*product);
-            }
-        }
-        for (place, number) in active.iter().enumerate() {
-            self.diagonal[*number] += single(products[(place, place)]);
-        }
-        self.by_baseline.zip_apply(&border.by_baseline, |to, of| *to += single(of));
-        self.by_gain.zip_apply(&border.by_gain, |to, of| *to += single(of));
-        add(&mut self.own, &border.own);
-    }
-}
-
-impl Segments {
-    pub(super) fn of(problem: &Problem<'_>, at: &Parameters) -> Self {
-        let bins = problem.predictor.bins;
-        let walk =
-            at.terms.iter().find(|term| is_random_walk(term)).map(|term| [term.values[0], term.values[1]]);
-        let walk = walk.filter(|[rate, knot_s]| *rate > 0.0 && *knot_s > 0.0);
-        let (mut of_bin, mut run) = (Vec::with_capacity(bins.len()), Vec::new());
-        let mut key = None;
-        for bin in 0..bins.len() {
-            #[expect(clippy::cast_possible_truncation, reason = "a number of segments")]
-            let part = walk.map_or(0, |[_, knot_s]| (bins.t_s[bin] / knot_s) as i64);
-            // A block has one segment.
-            let is_new = key.is_none_or(|(before_run, before)| before_run != bins.run[bin] || before != part);
-            let starts = bin == 0 || bins.block[bin] != bins.block[bin - 1];
-            if is_new && starts {
-                key = Some((bins.run[bin], part));
-                run.push(bins.run[bin]);
-            }
-            of_bin.push(run.len().saturating_sub(1));
-        }
-        let stiffness = walk.map_or(0.0, |[rate, knot_s]| 1.0 / (rate * rate * knot_s));
-        Self { of_bin, run, stiffness }
     }
 }
