@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use super::parameters::Parameters;
 use super::predictor::{Reached, Stream};
 use super::problem::Problem;
-use super::tiles::{Alone, Readings, Sums};
+use super::tiles::{Alone, Border, Readings, Sums};
 use super::totals::{Kept, Segments, Total};
 use crate::data::DiscoverError;
 use crate::numbers::parallel;
