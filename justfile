@@ -42,7 +42,7 @@ test:
 build:
     test -n "${TACTUS_BUILT:-}" || cargo test --workspace --no-run --quiet
 
-# The bus with TLS: clients with and without certificates. Some 15 more crates are built for it.
+# The bus with TLS: clients with and without certificates, and a router of several hosts. Some 15 more crates are built for it.
 tls:
     cargo test -p tactus-bus --features tls --test it tls::
 
@@ -245,10 +245,10 @@ bench:
     cargo run --profile dist --package tactus-bench -- limits
     cargo run --profile dist --package tactus-bench -- acuity
 
-# The same beside others' programs. Compiled for the processor at hand, as the peers' wheels choose their instructions when they run.
+# The same beside others' programs, as compiled for any processor: all choose their instructions when they run.
 bench-peers *arguments: bench-peers-tools
-    RUSTFLAGS="-C target-cpu=native" cargo build --profile dist --package tactus-bench --target-dir target/native
-    {{ tools }}/peers/bin/python bench/peers/forward.py --binary target/native/dist/tactus-bench {{ arguments }}
+    cargo build --profile dist --package tactus-bench
+    {{ tools }}/peers/bin/python bench/peers/forward.py {{ arguments }}
 
 # The way of a frame to another process, frames to disk, presses of a script: beside zenoh, pyserial with pyzmq, LSL, mcap, h5py, bluesky.
 bench-service *arguments: bench-service-tools
