@@ -50,6 +50,8 @@ pub struct Chosen {
 pub struct Decision {
     /// The hidden physics and the effects that resemble it.
     pub twins: Twins,
+    /// What is named in the end.
+    pub named: Vec<Undecided>,
     /// The experiments of the round, in order; empty if nothing was undecided.
     pub chosen: Vec<Chosen>,
 }
@@ -107,6 +109,7 @@ const RIG: &str = include_str!("../../../config/rigs/sim.toml");
 
 #[derive(Debug, Deserialize)]
 struct DiscoveryReport {
+    steps: Vec<Undecided>,
     active: Vec<Chosen>,
 }
 
@@ -152,7 +155,16 @@ impl Twins {
         discover.args(["--json", "discover", "--active", "--budget-min"]).arg(BUDGET_MIN.to_string());
         on_rig(discover.arg(summary.recording).arg("--out").arg(&out))?;
         let report: DiscoveryReport = parsed(&out.join("report.json"))?;
-        Ok(Decision { twins: self, chosen: report.active })
+        Ok(Decision { twins: self, named: report.steps, chosen: report.active })
+    }
+
+    /// True if the right effect is named, and no twin is named or equivalent to it.
+    fn are_decided(self, named: &[Undecided]) -> bool {
+        let is_twin = |name: &str| self.twins.contains(&name);
+        named
+            .iter()
+            .any(|one| one.effect == self.effect && !one.equivalent.iter().any(|other| is_twin(other)))
+            && !named.iter().any(|one| is_twin(&one.effect))
     }
 }
 
@@ -168,16 +180,14 @@ impl Decision {
         })
     }
 
-    /// True if afterwards the right effect was named, and no twin was named or equivalent to it.
+    /// True if after the round the right effect was named, and no twin was named or equivalent to it.
     pub fn is_decided_after(&self) -> bool {
-        let Twins { effect, twins, .. } = self.twins;
-        let is_twin = |name: &str| twins.contains(&name);
-        self.chosen.last().is_some_and(|last| {
-            last.after
-                .iter()
-                .any(|one| one.effect == effect && !one.equivalent.iter().any(|other| is_twin(other)))
-                && !last.after.iter().any(|one| is_twin(&one.effect))
-        })
+        self.chosen.last().is_some_and(|last| self.twins.are_decided(&last.after))
+    }
+
+    /// True if the first experiment decided it: then there is no round.
+    pub fn is_decided_at_once(&self) -> bool {
+        self.chosen.is_empty() && self.twins.are_decided(&self.named)
     }
 
     /// The rig's time for the round, in s.
@@ -188,17 +198,22 @@ impl Decision {
     fn row(&self) -> String {
         let Twins { physics, strength, effect, twins, experiment } = self.twins;
         let (before, after) = self.chosen.first().map_or_else(
-            || ("nothing undecided".into(), "-".into()),
+            || (in_words(&self.named), "-".into()),
             |first| (in_words(&first.before), in_words(&first.after)),
         );
         let experiments: Vec<String> = self.chosen.iter().map(Chosen::command).collect();
-        let is_so = self.is_undecided_before() && self.is_decided_after();
+        let decided = if self.is_decided_at_once() {
+            "by the first experiment"
+        } else if self.is_undecided_before() && self.is_decided_after() {
+            "yes"
+        } else {
+            "**no**"
+        };
         format!(
-            "| {physics} | {strength} | {effect} or {} | {experiment} | {before} | {} | {:.0} s | {after} | {} |\n",
+            "| {physics} | {strength} | {effect} or {} | {experiment} | {before} | {} | {:.0} s | {after} | {decided} |\n",
             twins.join(", "),
             experiments.join("; "),
             self.duration_s(),
-            if is_so { "yes" } else { "**no**" }
         )
     }
 }

@@ -10,21 +10,22 @@ const LOST_MOTION: Twins = Twins {
 
 /// A round with one experiment.
 fn decision(before: &[(&str, &[&str])], after: &[(&str, &[&str])]) -> Decision {
-    let undecided = |of: &[(&str, &[&str])]| {
-        let one = |(effect, equivalent): &(&str, &[&str])| Undecided {
-            effect: (*effect).into(),
-            equivalent: equivalent.iter().map(|name| (*name).into()).collect(),
-        };
-        of.iter().map(one).collect()
-    };
     let chosen = Chosen {
         experiment: "diagnose".into(),
         parameters: [("parts".into(), "approach".into())].into(),
         duration_s: 60.4,
-        before: undecided(before),
-        after: undecided(after),
+        before: named(before),
+        after: named(after),
     };
-    Decision { twins: LOST_MOTION, chosen: vec![chosen] }
+    Decision { twins: LOST_MOTION, named: named(after), chosen: vec![chosen] }
+}
+
+fn named(effects: &[(&str, &[&str])]) -> Vec<Undecided> {
+    let one = |(effect, equivalent): &(&str, &[&str])| Undecided {
+        effect: (*effect).into(),
+        equivalent: equivalent.iter().map(|name| (*name).into()).collect(),
+    };
+    effects.iter().map(one).collect()
 }
 
 #[test]
@@ -44,8 +45,17 @@ fn the_table_says_what_was_run_and_whether_it_decided() {
     let line = "| lost-motion | 0.2 | backlash or hysteresis | corners | hysteresis or backlash | \
                 diagnose parts=approach | 60 s | backlash | yes |";
     assert_eq!(twins_table(&[right]).lines().nth(2), Some(line));
-    let none = Decision { twins: LOST_MOTION, chosen: Vec::new() };
-    assert!(twins_table(&[none]).ends_with("| nothing undecided |  | 0 s | - | **no** |\n"));
+    let without_a_round = |effects: &[(&str, &[&str])]| {
+        twins_table(&[Decision { twins: LOST_MOTION, named: named(effects), chosen: Vec::new() }])
+    };
+    let decided = without_a_round(&[("backlash", &["time-lag"])]);
+    assert!(
+        decided.ends_with("| backlash or time-lag |  | 0 s | - | by the first experiment |\n"),
+        "{decided}"
+    );
+    let wrong = without_a_round(&[("hysteresis", &[])]);
+    assert!(wrong.ends_with("| hysteresis |  | 0 s | - | **no** |\n"), "{wrong}");
+    assert!(without_a_round(&[]).ends_with("| nothing named |  | 0 s | - | **no** |\n"));
 }
 
 #[test]
