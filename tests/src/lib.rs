@@ -4,6 +4,7 @@
 //! answer or an exit, with a deadline that only a hang can reach.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot go on says why and fails")]
 
+#[cfg(feature = "bus")]
 mod bus;
 mod link;
 mod tap;
@@ -27,6 +28,7 @@ use rustix::pty::{OpenptFlags, openpt, ptsname, unlockpt};
 use serde_json::Value;
 use tempfile::TempDir;
 
+#[cfg(feature = "bus")]
 pub use bus::{raw_session, within};
 pub use link::Link;
 pub use tap::{Tap, Way};
