@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use crate::lab::{Link, Service, connected, frame, open, open_with, router, router_at};
+use crate::lab::{Link, Service, connected, found, frame, open, open_with, router, router_at};
 use tactus_bus::{
     Bus, BusConfig, BusError, Client, Credentials, Endpoint, History, Lab, Losses, Subscription, ask_all,
 };
@@ -31,22 +31,6 @@ async fn publish(service: &Service, near: &mut Subscription<pb::Frame>, seqs: st
     }
 }
 
-/// Waits until the rig is found at the router, and returns a client that is there.
-async fn found(router: &Endpoint, rig: &str) -> Client {
-    let mut lab = loop {
-        match Lab::connect(router, &Credentials::default()).await {
-            Ok(lab) => break lab,
-            // The router may take its time on a busy machine.
-            Err(BusError::Session { .. } | BusError::NoService { .. }) => {}
-            Err(error) => panic!("{error}"),
-        }
-    };
-    while !lab.rigs().iter().any(|found| found == rig) {
-        lab.changed().await.unwrap();
-    }
-    lab.client(rig).await.unwrap()
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_service_works_without_its_router_and_joins_it_whenever_it_is_there() {
     let (first, endpoint) = router().await;
@@ -59,7 +43,7 @@ async fn a_service_works_without_its_router_and_joins_it_whenever_it_is_there() 
     let mut due = 3;
     for _ in 0..2 {
         let router = router_at(&endpoint).await.unwrap();
-        let client = found(&endpoint, "bench").await;
+        let client = found(&endpoint, "bench", &Credentials::default()).await;
         let mut far = client.subscribe::<pb::Frame>(History::All).await.unwrap();
         publish(&service, &mut near, due..due + 3).await;
         due += 3;
@@ -81,7 +65,7 @@ async fn a_client_that_was_cut_off_gets_what_is_kept_and_is_told_what_is_not() {
     let client = connected(&service.endpoint, "bench").await;
     let mut near = client.subscribe::<pb::Frame>(History::All).await.unwrap();
     let link = Link::to(&router).await;
-    let client = found(&link.endpoint, "bench").await;
+    let client = found(&link.endpoint, "bench", &Credentials::default()).await;
     let mut far = client.subscribe::<pb::Frame>(History::All).await.unwrap();
     publish(&service, &mut near, 0..1).await;
     assert_eq!(far.recv().await.unwrap().seq, 0);
@@ -119,7 +103,7 @@ async fn two_hosts_with_a_rig_of_one_name_are_refused_by_name() {
     let (_router, router) = router().await;
     let routers = std::slice::from_ref(&router);
     let first = open("twin", routers).await;
-    found(&router, "twin").await.close().await.unwrap();
+    found(&router, "twin", &Credentials::default()).await.close().await.unwrap();
     let second = open("twin", routers).await;
     let mut lab = Lab::connect(&router, &Credentials::default()).await.unwrap();
     let error = loop {

@@ -4,7 +4,7 @@
 
 use std::{net::TcpListener as StdListener, time::Duration};
 
-use tactus_bus::{Bus, BusConfig, BusError, Calls, Client, Endpoint};
+use tactus_bus::{Bus, BusConfig, BusError, Calls, Client, Credentials, Endpoint, Lab};
 use tactus_schema::{
     Frame, FrameFlags, MonoTime, TimeStamp, WallTime,
     key::{Command, Keys},
@@ -92,6 +92,22 @@ pub(crate) async fn connected(endpoint: &Endpoint, rig: &str) -> Client {
             Err(error) => panic!("{error}"),
         }
     }
+}
+
+/// Waits until the rig is found at the router, and returns a client that is there.
+pub(crate) async fn found(router: &Endpoint, rig: &str, credentials: &Credentials) -> Client {
+    let mut lab = loop {
+        match Lab::connect(router, credentials).await {
+            Ok(lab) => break lab,
+            // The router may take its time on a busy machine.
+            Err(BusError::Session { .. } | BusError::NoService { .. }) => {}
+            Err(error) => panic!("{error}"),
+        }
+    };
+    while !lab.rigs().iter().any(|found| found == rig) {
+        lab.changed().await.unwrap();
+    }
+    lab.client(rig).await.unwrap()
 }
 
 /// Returns once the service has processed the client's earlier declarations: declarations and commands of one session keep

@@ -4,10 +4,8 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use crate::lab::{Service, frame, free_endpoint, open_with};
-use tactus_bus::{
-    Bus, BusConfig, BusError, Calls, Client, Credentials, Endpoint, History, Hold, Lab, TlsConfig,
-};
+use crate::lab::{Service, found, frame, free_endpoint, open_with};
+use tactus_bus::{Bus, BusConfig, BusError, Calls, Client, Credentials, Endpoint, History, Hold, TlsConfig};
 use tactus_schema::{
     key::{Command, Keys},
     pb,
@@ -75,6 +73,17 @@ fn request() -> pb::CommandRequest {
     pb::CommandRequest { who: "test".to_owned(), ..Default::default() }
 }
 
+/// Nobody gets in without a certificate that the lab has signed.
+async fn only_the_lab_gets_in(endpoint: &Endpoint) {
+    let nobody = Credentials { authority: Some(file("lab-authority.pem")), ..Credentials::default() };
+    for (who, credentials) in
+        [("without a certificate", nobody), ("signed by a stranger", credentials("stranger"))]
+    {
+        let denied = Client::connect_as(endpoint, Some("bench"), &credentials).await;
+        assert!(matches!(denied, Err(BusError::Session { .. })), "{who}: {denied:?}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn who_is_listed_commands_or_reads_and_nobody_else_gets_in() {
     let (opened, endpoint) = open(tls()).await;
@@ -103,13 +112,7 @@ async fn who_is_listed_commands_or_reads_and_nobody_else_gets_in() {
         let denied = visitor.command(Command::Status, &request(), Duration::from_millis(100)).await;
         assert!(matches!(denied, Err(BusError::NoAnswer { .. })), "{denied:?}");
     }
-    let nobody = Credentials { authority: Some(file("lab-authority.pem")), ..Credentials::default() };
-    for (who, credentials) in
-        [("without a certificate", nobody), ("signed by a stranger", credentials("stranger"))]
-    {
-        let denied = Client::connect_as(&endpoint, Some("bench"), &credentials).await;
-        assert!(matches!(denied, Err(BusError::Session { .. })), "{who}: {denied:?}");
-    }
+    only_the_lab_gets_in(&endpoint).await;
     bus.close().await.unwrap();
 }
 
@@ -140,7 +143,8 @@ async fn router(name: &str) -> (zenoh::Session, Endpoint) {
             ("router.key", format!("{name}.key")),
         ] {
             assert!(settings.contains(shown), "{settings}");
-            settings = settings.replacen(&format!("\"{shown}\""), &format!("{:?}", file(&used)), 1);
+            settings =
+                settings.replacen(&format!("\"{shown}\""), &format!("\"{}\"", file(&used).display()), 1);
         }
         if let Ok(session) = zenoh::open(zenoh::Config::from_json5(&settings).unwrap()).await {
             return (session, endpoint);
@@ -157,29 +161,12 @@ async fn joined(router: &Endpoint) -> Bus {
     bus
 }
 
-/// A client at a router, which the service joins whenever it does.
-async fn at(router: &Endpoint) -> Client {
-    let visitor = credentials("visitor");
-    let mut lab = loop {
-        match Lab::connect(router, &visitor).await {
-            Ok(lab) => break lab,
-            // The router may take its time on a busy machine.
-            Err(BusError::Session { .. } | BusError::NoService { .. }) => {}
-            Err(error) => panic!("{error}"),
-        }
-    };
-    while !lab.rigs().iter().any(|found| found == "bench") {
-        lab.changed().await.unwrap();
-    }
-    lab.client("bench").await.unwrap()
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_router_may_do_what_its_name_is_listed_for() {
     for (name, commands) in [("commander", true), ("reader", false)] {
         let (router, endpoint) = router(name).await;
         let bus = joined(&endpoint).await;
-        let client = at(&endpoint).await;
+        let client = found(&endpoint, "bench", &credentials("visitor")).await;
         let mut frames = client.subscribe::<pb::Frame>(History::All).await.unwrap();
         assert_eq!(frames.recv().await.unwrap().seq, 7, "{name}");
         assert!(client.command(Command::Status, &request(), PATIENCE).await.unwrap().ok, "{name}");
@@ -189,12 +176,7 @@ async fn a_router_may_do_what_its_name_is_listed_for() {
             let denied = client.command(Command::Reset, &request(), Duration::from_millis(100)).await;
             assert!(matches!(denied, Err(BusError::NoAnswer { .. })), "{denied:?}");
         }
-        // Nobody gets to the router without a certificate of the lab.
-        let nobody = Credentials { authority: Some(file("lab-authority.pem")), ..Credentials::default() };
-        for credentials in [nobody, credentials("stranger")] {
-            let denied = Client::connect_as(&endpoint, Some("bench"), &credentials).await;
-            assert!(matches!(denied, Err(BusError::Session { .. })), "{denied:?}");
-        }
+        only_the_lab_gets_in(&endpoint).await;
         bus.close().await.unwrap();
         router.close().await.unwrap();
     }
