@@ -180,12 +180,24 @@ fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
         false,
         scores.separate_pairs.named,
     ));
+    rows.push(rate(
+        "two effects, each 5 and more from the nearest wrong one: both named",
+        0.9,
+        false,
+        scores.nameable_pairs.named,
+    ));
     rows.push(rate("three effects: all named", 0.75, false, scores.triples.named));
     rows.push(rate(
         "three effects, each with z of 16 and more: all named",
         0.75,
         false,
         scores.separate_triples.named,
+    ));
+    rows.push(rate(
+        "three effects, each 5 and more from the nearest wrong one: all named",
+        0.75,
+        false,
+        scores.nameable_triples.named,
     ));
     if let Some(all) = scores.outside.get("all") {
         rows.push(rate("outside the library: not detected", 0.1, true, all.missed));
@@ -324,8 +336,10 @@ fn several(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
     let rows = [
         ("two", &scores.pairs),
         ("two, each with z of 16 and more", &scores.separate_pairs),
+        ("two, each 5 and more from the nearest wrong one", &scores.nameable_pairs),
         ("three", &scores.triples),
         ("three, each with z of 16 and more", &scores.separate_triples),
+        ("three, each 5 and more from the nearest wrong one", &scores.nameable_triples),
     ];
     for (name, several) in rows {
         let Several { named, exact, in_set, wrong, recall, precision, shrink } = several;

@@ -62,6 +62,10 @@ pub struct Scores {
     pub separate_pairs: Several,
     /// The same with three effects.
     pub separate_triples: Several,
+    /// The sets with two effects of which each is at least [`Z_NAMEABLE`] from the nearest wrong one, where that is computed.
+    pub nameable_pairs: Several,
+    /// The same with three effects.
+    pub nameable_triples: Several,
     /// Sets outside the library: `all` and by physics.
     pub outside: BTreeMap<String, OutsideScore>,
     /// Drafts of what no class explains.
@@ -209,7 +213,9 @@ impl Scores {
         let bands = |sets: &[&Outcome]| {
             BANDS.iter().map(|(name, range)| Band::new(name, &within(sets, *range))).collect()
         };
-        let nameable: Vec<&Outcome> = names.iter().filter(|set| set.is_apart()).copied().collect();
+        let apart = |sets: &[&Outcome]| -> Vec<&Outcome> {
+            sets.iter().filter(|set| set.is_apart()).copied().collect()
+        };
         let separate = within(&names, BANDS[3].1);
         let effect = |(effect, sets): (String, Vec<&Outcome>)| {
             let band = Band::new("", &sets);
@@ -220,7 +226,7 @@ impl Scores {
             failed: failed.collect(),
             false_alarms: by_noise(&false_alarms),
             bands: bands(&names),
-            nameable: Band::new("", &nameable),
+            nameable: Band::new("", &apart(&names)),
             library_points: bands(&points),
             effects: by_effect(&separate).into_iter().map(effect).collect(),
             power: by_effect(&names).into_iter().map(|(effect, sets)| (effect, power(&sets))).collect(),
@@ -229,6 +235,8 @@ impl Scores {
             triples: Several::new(&triples),
             separate_pairs: Several::new(&within(&pairs, BANDS[3].1)),
             separate_triples: Several::new(&within(&triples, BANDS[3].1)),
+            nameable_pairs: Several::new(&apart(&pairs)),
+            nameable_triples: Several::new(&apart(&triples)),
             outside: by_physics(&outside)
                 .into_iter()
                 .map(|(physics, sets)| (physics, OutsideScore::new(&sets)))

@@ -125,3 +125,16 @@ fn library_points_and_sets_that_nobody_could_name_are_counted_apart() {
     assert_eq!((scores.bands[0].exact.of, scores.library_points[0].exact.of), (3, 1));
     assert_eq!(scores.nameable.exact.of, 1);
 }
+
+#[test]
+fn pairs_that_nobody_could_name_are_counted_apart() {
+    let truths = [Some("backlash"), Some("imprint")];
+    let named =
+        of(Campaign::Pairs, "pairs/000", set(&truths, &[("backlash", &[]), ("imprint", &[])], "explained"));
+    let mut twin = of(Campaign::Pairs, "pairs/001", set(&truths, &[("backlash", &[])], "explained"));
+    twin.truths[1].z_name = Some(4.0);
+    let scores = Scores::new(&[named, twin]);
+    assert_eq!((scores.pairs.named.hits, scores.pairs.named.of), (1, 2));
+    assert_eq!((scores.nameable_pairs.named.hits, scores.nameable_pairs.named.of), (1, 1));
+    assert_eq!(scores.nameable_triples.named.of, 0);
+}

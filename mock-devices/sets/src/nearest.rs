@@ -25,11 +25,12 @@ pub struct ClassFits {
 
 impl ClassFits {
     /// `min over wrong c of sqrt(max(0, z_c^2 - z_true^2))`: how far the nearest wrong effect fits worse than the true one. Of physics
-    /// outside the library (`None`) every effect is wrong, and the truth leaves nothing.
+    /// outside the library (`None`) every effect is wrong, and the truth leaves nothing. An effect that is neutral leaves what the base
+    /// model leaves, and none fits worse.
     pub fn z_name(&self, effect: Option<&str>) -> Option<f64> {
-        let right = effect.map_or(Some(0.0), |effect| self.effects.get(effect).copied())?;
+        let right = effect.map_or(Some(0.0), |effect| self.effects.get(effect).copied())?.min(self.base);
         let wrong = self.effects.iter().filter(|(name, _)| Some(name.as_str()) != effect).map(|(_, z)| *z);
-        Some((wrong.fold(f64::INFINITY, f64::min).powi(2) - right.powi(2)).max(0.0).sqrt())
+        Some((wrong.fold(self.base, f64::min).powi(2) - right.powi(2)).max(0.0).sqrt())
     }
 
     /// The share of what the base model leaves that an effect explains.

@@ -53,6 +53,14 @@ fn the_nearest_wrong_effect_counts() {
 }
 
 #[test]
+fn no_effect_fits_worse_than_the_base_model() {
+    let effects = [("a", 3.0), ("b", 460.0), ("c", 52.0)].map(|(name, z)| (name.to_owned(), z));
+    let fits = ClassFits { base: 5.0, effects: effects.into() };
+    assert_eq!(fits.z_name(Some("a")), Some(4.0));
+    assert_eq!(fits.z_name(Some("b")), Some(0.0));
+}
+
+#[test]
 fn a_tone_is_found_by_its_line() {
     let series: Vec<f64> = (0..900).map(|frame| (TAU * 3.21 * f64::from(frame) / 30.0).sin()).collect();
     assert!((strongest_hz(&series, 30.0) - 3.21).abs() < 30.0 / 1800.0);

@@ -511,17 +511,26 @@ fn scaled(rows: Vec<Vec<f64>>, by: f64) -> Vec<Vec<f64>> {
 fn additions(weighed: &[Weighed], grams: &Grams, count: f64) -> Vec<Addition> {
     let last = grams.reduced().nrows() - 1;
     let residual = grams.reduced()[(last, last)].sqrt();
-    // As an atom has no range: what would make the whole residual.
-    let width = |one: &usize| residual / grams.whole(*one).max(f64::MIN_POSITIVE);
     let of = |(class, one): (usize, &Weighed)| Addition {
         class,
         directions: one.directions.clone(),
-        widths: one.directions.iter().map(width).collect(),
+        widths: widths(
+            residual,
+            &one.directions.iter().map(|direction| grams.whole(*direction)).collect::<Vec<_>>(),
+        ),
         signs: vec![Signs::Both; one.directions.len()],
         among: count * one.atom.among,
         is_free: false,
     };
     weighed.iter().enumerate().map(of).collect()
+}
+
+/// The width of each coefficient of an atom whose columns have these sizes: the same for all, since they are values of one curve. An atom has
+/// no range, so it is what would make the whole residual where that sees the curve most. With a width of its own, a knot that hardly any
+/// reading sees could have any value.
+fn widths(residual: f64, sizes: &[f64]) -> Vec<f64> {
+    let largest = sizes.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    vec![residual / largest; sizes.len()]
 }
 
 /// Those that are behind the first by less than a draft must be ahead of a class.
@@ -538,3 +547,7 @@ fn ranked(evidence: &Evidence<'_>) -> Vec<(usize, f64)> {
     ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
     ranked
 }
+
+#[cfg(test)]
+#[path = "draft_tests.rs"]
+mod tests;

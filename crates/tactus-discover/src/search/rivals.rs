@@ -34,7 +34,7 @@ use std::sync::Arc;
 
 use super::covariates::{Factor, Feature, Form, Forms, LOW_MM};
 use super::evidence::Signs;
-use super::tones::{Point, Tone, clearest};
+use super::tones::{Point, Tone, clearest, most_per_count};
 use super::varying::varying;
 use crate::data::DiscoverError;
 use crate::fit::{Direction, Fitted, Problem, hat};
@@ -172,7 +172,7 @@ fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>, rounds:
             point
         };
         let points: Vec<Point> = (0..bins.len()).map(point).collect();
-        clearest(&points.into_iter())
+        clearest(&points.into_iter(), f64::INFINITY)
     };
     let of_bins = |name, values: Vec<f64>, form: Form, carrier: &dyn Fn(usize) -> f64| {
         let tone = in_bins(&values, carrier)?;
@@ -189,7 +189,7 @@ fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>, rounds:
             wanted: weight * residual,
             square: *weight,
         });
-        let tone = clearest(&points)?;
+        let tone = clearest(&points, most_per_count(problem.predictor.known.array.step_counts()))?;
         let column = |wave: fn(f64) -> f64| -> Direction<'a> {
             Direction::Column(Box::new(move |bins: Range<usize>| {
                 let counts = &at.predicted[bins.start * elements..bins.end * elements];

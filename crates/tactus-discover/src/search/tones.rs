@@ -22,6 +22,8 @@ const FINER: usize = 4;
 const PERIODS_LEAST: usize = 3;
 /// A period has at least this many cells.
 const CELLS_LEAST: usize = 4;
+/// A tone in counts has a period of at least so many steps of the converter: anything shorter is its rounding, which is no tone of the sensor.
+const STEPS_LEAST: f64 = 2.0;
 
 /// A frequency that was picked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,8 +44,13 @@ pub(super) struct Point {
     pub(super) square: f64,
 }
 
-/// The clearest tone; `None` if the covariate does not vary.
-pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone)) -> Option<Tone> {
+/// Most periods per count of a tone in counts.
+pub(super) fn most_per_count(step_counts: f64) -> f64 {
+    (STEPS_LEAST * step_counts).recip()
+}
+
+/// The clearest tone of at most so many periods per unit; `None` if the covariate does not vary, or not by enough for one.
+pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone), per_unit_most: f64) -> Option<Tone> {
     let weighed = || points.clone().filter(|point| point.square > 0.0);
     let least = weighed().map(|point| point.value).fold(f64::INFINITY, f64::min);
     let most = weighed().map(|point| point.value).fold(f64::NEG_INFINITY, f64::max);
@@ -64,7 +71,13 @@ pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone)) -> Option
         at[0] = wanted - mean * square;
     }
     transform(&mut series);
-    let frequencies = PERIODS_LEAST..CELLS / CELLS_LEAST;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "positive; what is too large is cut off"
+    )]
+    let most = (per_unit_most * range) as usize;
+    let frequencies = PERIODS_LEAST..most.min(CELLS / CELLS_LEAST);
     let power = |place: &usize| series[*place][0].powi(2) + series[*place][1].powi(2);
     let places = FINER * frequencies.start..FINER * frequencies.end;
     let best = places.max_by(|a, b| power(a).total_cmp(&power(b)))?;

@@ -1,7 +1,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Point, clearest};
+use super::{Point, clearest, most_per_count};
 
 fn points(values: &[f64], residual: impl Fn(f64) -> f64) -> Vec<Point> {
     values.iter().map(|value| Point { value: *value, wanted: residual(*value), square: 1.0 }).collect()
@@ -14,7 +14,7 @@ fn a_tone_is_found_at_values_that_are_not_spaced_evenly() {
     let noise: Vec<f64> = values.iter().map(|_| rng.random_range(-1.0..1.0)).collect();
     let mut made = points(&values, |value| 0.4 * (std::f64::consts::TAU * 1.37 * value + 0.8).sin());
     made.iter_mut().zip(&noise).for_each(|(point, noise)| point.wanted += noise);
-    let tone = clearest(&made.into_iter()).unwrap();
+    let tone = clearest(&made.into_iter(), f64::INFINITY).unwrap();
     // A fifth of the resolution, one period in the range.
     assert!((tone.per_unit - 1.37).abs() < 0.2 / 70.0, "{tone:?}");
 }
@@ -26,11 +26,28 @@ fn a_constant_residual_has_no_tone_where_the_weights_have_one() {
         let square = 1.0 + 0.9 * (tau * 0.1 * value).cos();
         Point { value, wanted: square * (100.0 + 0.05 * (tau * 0.031 * value).sin()), square }
     });
-    let tone = clearest(&made).unwrap();
+    let tone = clearest(&made, f64::INFINITY).unwrap();
     assert!((tone.per_unit - 0.031).abs() < 0.2 / 2000.0, "{tone:?}");
 }
 
 #[test]
 fn a_covariate_that_does_not_vary_has_no_tone() {
-    assert!(clearest(&points(&[2.0; 40], |_| 1.0).into_iter()).is_none());
+    assert!(clearest(&points(&[2.0; 40], |_| 1.0).into_iter(), f64::INFINITY).is_none());
+}
+
+/// A quiet signal between two codes is read as the nearer one, whatever the array is.
+#[test]
+fn the_rounding_of_a_converter_is_no_tone() {
+    let values: Vec<f64> = (0..4000).map(|place| 0.0713 * f64::from(place)).collect();
+    let made = points(&values, |value| value.round() - value + 0.1 * (0.2 * value).sin());
+    let tone = clearest(&made.clone().into_iter(), f64::INFINITY).unwrap();
+    assert!((tone.per_unit - 1.0).abs() < 1e-3, "{tone:?}");
+    let tone = clearest(&made.into_iter(), most_per_count(1.0)).unwrap();
+    assert!((tone.per_unit - 0.2 / std::f64::consts::TAU).abs() < 1e-3, "{tone:?}");
+}
+
+#[test]
+fn a_range_of_few_steps_has_no_tone_in_counts() {
+    let values: Vec<f64> = (0..40).map(|place| 0.1 * f64::from(place)).collect();
+    assert!(clearest(&points(&values, f64::sin).into_iter(), most_per_count(1.0)).is_none());
 }

@@ -11,7 +11,7 @@ use tactus_model::effect::{Carrier, When};
 use super::sight::{OF_ELEMENTS, Sight};
 use super::{KNOTS, KNOTS_OF_DISTANCE, KNOTS_OF_SECOND};
 use crate::fit::{Fitted, Problem};
-use crate::search::tones::{Point, clearest};
+use crate::search::tones::{Point, clearest, most_per_count};
 
 /// A draft without its curve.
 #[derive(Debug, Clone)]
@@ -210,7 +210,11 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
             wanted: weights[reading] * residual[reading] * unit,
             square: weights[reading] * unit * unit,
         });
-        if let Some(tone) = clearest(&points) {
+        let per_unit_most = match covariate {
+            Covariate::Counts => most_per_count(problem.predictor.known.array.step_counts()),
+            _ => f64::INFINITY,
+        };
+        if let Some(tone) = clearest(&points, per_unit_most) {
             let atom = Atom::of(carrier, when, covariate, Vec::new());
             found.push(Atom { per_unit: Some(tone.per_unit), among: tone.among, ..atom });
         }
