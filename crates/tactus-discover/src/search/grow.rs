@@ -71,6 +71,10 @@ const FINISHED_MAX: usize = 2;
 pub(super) const PROMISE_SHARE: f64 = 0.3;
 /// Logarithm of the odds with which a class is added and holds its place.
 pub(super) const LN_ODDS_LEAST: f64 = 5.0;
+/// With such odds noise is no explanation, whatever the flips of signs say, which see little of what acts in few blocks. Odds are a ratio of
+/// likelihoods whose mean under noise is that of the prior, so noise gives odds of `k` with a probability of at most `1 / k` (Markov); if the
+/// variance of the noise is twice what is assumed, half of their logarithm is left.
+const LN_ODDS_CERTAIN: f64 = 30.0;
 /// Real physics has not quite the form of the library: differences of the logarithm of the odds count for one part in
 /// `1 + MISFIT_SHARE x gain`. From tuning sets: `just discovery-constants` prints how many sets hold the hidden class at each value, and
 /// their size.
@@ -215,7 +219,7 @@ impl Search<'_> {
             let is_full = count >= NAMES_MAX || index >= 2 * NAMES_MAX;
             // What is small beside the gain of another class may be an error of that one's form.
             let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
-            let (fits, refused) = if 2.0 * tried.p_value <= ALPHA && !is_full {
+            let (fits, refused) = if is_missing(tried.p_value, pass.most_ln_odds()) && !is_full {
                 self.reporter
                     .enter(Stage::Fitting { names: count }, &format!("round {round}: fitting effects"));
                 self.next(grown, &pass, least)?
@@ -533,6 +537,11 @@ impl Search<'_> {
     }
 }
 
+/// True if something is missing in a model of which a test of all additions gives this p-value, and the best of them these odds.
+fn is_missing(p_value: f64, ln_odds: f64) -> bool {
+    2.0 * p_value <= ALPHA || ln_odds > LN_ODDS_CERTAIN
+}
+
 /// True if an effect has the same form in reality as in the library: wiring is right or wrong.
 pub(super) fn is_exact(name: &str) -> bool {
     name == MISWIRED
@@ -560,3 +569,7 @@ pub(crate) fn without(parameters: &Parameters, name: &str, known_terms: usize) -
     });
     less
 }
+
+#[cfg(test)]
+#[path = "grow_tests.rs"]
+mod tests;

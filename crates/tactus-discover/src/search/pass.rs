@@ -84,6 +84,13 @@ impl Pass {
         (0..self.additions.len()).filter(|one| self.is_named(*one) && among(self.class_of(*one))).collect()
     }
 
+    /// Logarithm of the greatest odds of any named addition by itself.
+    pub(super) fn most_ln_odds(&self) -> f64 {
+        let evidence = self.evidence();
+        let gains = evidence.best_of_classes(&evidence.none(), &self.among(|_| true), 0.0);
+        gains.first().map_or(0.0, |(_, gain)| gain.ln_odds)
+    }
+
     /// The additions that are the free part of a class.
     fn free(&self, class: &str) -> Vec<usize> {
         (0..self.additions.len())
