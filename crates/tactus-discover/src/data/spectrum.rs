@@ -10,8 +10,9 @@ use crate::numbers::{NORMAL_PER_MEDIAN, median};
 /// Least height of a line above the surrounding power, in units of the scatter of that power. The sum over elements with
 /// independent noise scatters less.
 const STANDS_OUT: f64 = 8.0;
-/// Factor over the surrounding power at which the rhythm of the presses has a line.
-const RHYTHM_STANDS_OUT: f64 = 6.0;
+/// Factor over the median of the surrounding power at which the rhythm of the presses has a line. The powers of presses without a rhythm are
+/// distributed exponentially: `2^-10` of them exceed so much.
+const RHYTHM_STANDS_OUT: f64 = 10.0;
 /// Number of frequencies on each side that count as surrounding.
 const AROUND: usize = 40;
 /// Least number of periods in the data; anything slower is a drift.
