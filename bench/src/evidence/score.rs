@@ -213,9 +213,6 @@ impl Scores {
         let bands = |sets: &[&Outcome]| {
             BANDS.iter().map(|(name, range)| Band::new(name, &within(sets, *range))).collect()
         };
-        let apart = |sets: &[&Outcome]| -> Vec<&Outcome> {
-            sets.iter().filter(|set| set.is_apart()).copied().collect()
-        };
         let separate = within(&names, BANDS[3].1);
         let effect = |(effect, sets): (String, Vec<&Outcome>)| {
             let band = Band::new("", &sets);
@@ -330,6 +327,11 @@ pub(super) fn oracle(z: f64) -> f64 {
 
 fn within<'a>(sets: &[&'a Outcome], [least, most]: [f64; 2]) -> Vec<&'a Outcome> {
     sets.iter().copied().filter(|set| (least..most).contains(&set.z())).collect()
+}
+
+/// Those that somebody could name: of which each effect is far enough from the nearest wrong one.
+fn apart<'a>(sets: &[&'a Outcome]) -> Vec<&'a Outcome> {
+    sets.iter().copied().filter(|set| set.is_apart()).collect()
 }
 
 /// The hidden effect, as [`Cell::truth`].
