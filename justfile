@@ -299,7 +299,7 @@ bench-discovery: bench-peers-tools
         json.dump({who: json.load(open(f"{at}{who}.json")) for who in ("ours", "peers")}, open(f"{at}costs.json", "w"), indent=1)'
     cat target/evidence/costs.json
 
-# The same tables from a first look at sealed sets: every physics once, strong, some 200 sets in half an hour on two cores.
+# The same tables from a first look at sealed sets: every physics once, strong, some 240 sets in half an hour on two cores.
 discovery-glance:
     cargo build --profile dist --package tactus --package tactus-bench
     target/dist/tactus-bench evidence run --seeds sealed --size glance --work target/evidence/glance/work \

@@ -142,15 +142,15 @@ impl Sizes {
         }
     }
 
-    /// A first look: every physics once and strong, a tenth of the other sets.
+    /// A first look: every physics once and strong, a third of the sets with several effects and a tenth of those without any.
     pub fn glance() -> Self {
         Self {
             false_alarms: 48,
             separations: vec![40.0],
             strengths: Vec::new(),
             name_seeds: 1,
-            pairs: 12,
-            triples: 6,
+            pairs: 40,
+            triples: 20,
             outside_separations: vec![40.0],
             outside_strengths: Vec::new(),
             outside_seeds: 1,
