@@ -48,8 +48,6 @@ const KNOTS_OF_DISTANCE: usize = 12;
 const FOLDS: usize = 5;
 /// Logarithm of the odds by which a draft must be ahead of every class.
 const AHEAD_LN_ODDS: f64 = 5.0;
-/// A knot is seen well if its column is at least this share of the largest of its curve: by a hundredth of the readings.
-const SEEN_SHARE: f64 = 0.1;
 /// Least part of a draft that recalibration and the model do not take up.
 const OWN_LEAST: f64 = 0.05;
 /// In so many folds the same atom must come first.
@@ -527,12 +525,12 @@ fn additions(weighed: &[Weighed], grams: &Grams, count: f64) -> Vec<Addition> {
     weighed.iter().enumerate().map(of).collect()
 }
 
-/// The width of each coefficient of an atom whose columns have these sizes. An atom has no range: each could make the whole residual. But its
-/// coefficients are values of one curve, and a knot that hardly any reading sees could then have any value: it has the width of one that is
-/// seen well.
+/// The width of each coefficient of an atom whose columns have these sizes: the same for all, since they are values of one curve. An atom has
+/// no range, so it is what would make the whole residual where that sees the curve most. With a width of its own, a knot that hardly any
+/// reading sees could have any value.
 fn widths(residual: f64, sizes: &[f64]) -> Vec<f64> {
-    let least = SEEN_SHARE * sizes.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    sizes.iter().map(|size| residual / size.max(least)).collect()
+    let largest = sizes.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    vec![residual / largest; sizes.len()]
 }
 
 /// Those that are behind the first by less than a draft must be ahead of a class.

