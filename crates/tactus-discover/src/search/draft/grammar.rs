@@ -210,9 +210,10 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
             wanted: weights[reading] * residual[reading] * unit,
             square: weights[reading] * unit * unit,
         });
-        let per_unit_most = match covariate {
-            Covariate::Counts => most_per_count(problem.predictor.known.array.step_counts()),
-            _ => f64::INFINITY,
+        let per_unit_most = if covariate == Covariate::Counts {
+            most_per_count(problem.predictor.known.array.step_counts())
+        } else {
+            f64::INFINITY
         };
         if let Some(tone) = clearest(&points, per_unit_most) {
             let atom = Atom::of(carrier, when, covariate, Vec::new());
