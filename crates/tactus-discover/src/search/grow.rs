@@ -219,7 +219,9 @@ impl Search<'_> {
             let is_full = count >= NAMES_MAX || index >= 2 * NAMES_MAX;
             // What is small beside the gain of another class may be an error of that one's form.
             let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
-            let (fits, refused) = if is_missing(tried.p_value, pass.most_ln_odds()) && !is_full {
+            // The errors of coarse steps repeat, and are no noise.
+            let ln_odds = if self.rounds { 0.0 } else { pass.most_ln_odds() };
+            let (fits, refused) = if is_missing(tried.p_value, ln_odds) && !is_full {
                 self.reporter
                     .enter(Stage::Fitting { names: count }, &format!("round {round}: fitting effects"));
                 self.next(grown, &pass, least)?
