@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 use tactus_bus::{Client, Endpoint, History, Subscription};
-use tactus_e2e::{CommandOutput, Process, free_endpoint, repository, small_rig, tactus, within};
+use tactus_e2e::{CommandOutput, Process, free_endpoint, repository, small_rig, tactus, until, within};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb;
 use tempfile::TempDir;
@@ -146,7 +146,8 @@ fn devices_that_die_harm_no_other_rig_and_are_found_again() {
         seqs.extend(within(&runtime, frames(frames_of, FRAMES)));
         assert_unbroken(seqs);
     }
-    assert_eq!(lab.status("middle")["problem"], "sensor and stage do not answer");
+    let missed = "sensor and stage do not answer";
+    until("both devices are missed", || (lab.status("middle")["problem"] == missed).then_some(()));
     assert_eq!(lab.status("left")["problem"], Value::Null);
     let table = lab.tactus(&["status"]);
     assert!(table.out.contains("middle  OFF") && table.out.contains("left    running"), "{table:?}");
