@@ -51,6 +51,15 @@ impl Lab {
         mock
     }
 
+    /// Kills the devices of a rig, and takes their links away: the system gives the number of a terminal that is gone to the next one, which
+    /// may be another test's.
+    fn kill(&self, name: &str, mock: &mut Process) {
+        mock.kill();
+        for link in fs::read_dir(self.folder.path().join(format!("mock-{name}"))).unwrap() {
+            fs::remove_file(link.unwrap().path()).unwrap();
+        }
+    }
+
     fn serve(&self) -> Process {
         Process::start("tactusd", self.folder.path(), &["--config", "tactusd.toml"])
     }
@@ -140,7 +149,7 @@ fn devices_that_die_harm_no_other_rig_and_are_found_again() {
         .map(|client| within(&runtime, client.subscribe::<pb::Frame>(History::None)).unwrap());
     let mut seen = [&mut left, &mut right].map(|frames_of| within(&runtime, frames(frames_of, FRAMES)));
 
-    middle.kill();
+    lab.kill("middle", &mut middle);
     daemon.wait_until(|line| line.contains("rig{name=\"middle\"}") && line.contains("sensor lost"));
     for (seqs, frames_of) in seen.iter_mut().zip([&mut left, &mut right]) {
         seqs.extend(within(&runtime, frames(frames_of, FRAMES)));
