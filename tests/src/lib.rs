@@ -435,10 +435,10 @@ impl Drop for Process {
 /// A virtual rig at pseudo-terminals and a service that uses it, in a temporary folder.
 #[derive(Debug)]
 pub struct ServiceUnderTest {
+    /// The running `tactusd`. It ends before the devices: else it could open a terminal that got their number.
+    pub daemon: Process,
     /// The virtual devices; faults are typed into them.
     pub mock: Process,
-    /// The running `tactusd`.
-    pub daemon: Process,
     /// Bus endpoint of the service.
     pub endpoint: String,
     /// The working directory of both.
