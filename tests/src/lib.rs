@@ -502,7 +502,7 @@ impl ServiceUnderTest {
         );
         mock.wait_for("stage");
         let daemon = start("tactusd", folder.path(), &["--config", "tactusd.toml"]);
-        Self { mock, daemon, endpoint, folder }
+        Self { daemon, mock, endpoint, folder }
     }
 
     /// Runs `tactus` against the service, to its end.
