@@ -514,10 +514,10 @@ fn additions(weighed: &[Weighed], grams: &Grams, count: f64) -> Vec<Addition> {
     let of = |(class, one): (usize, &Weighed)| Addition {
         class,
         directions: one.directions.clone(),
-        widths: widths(
-            residual,
-            &one.directions.iter().map(|direction| grams.whole(*direction)).collect::<Vec<_>>(),
-        ),
+        widths: vec![
+            width(residual, one.directions.iter().map(|direction| grams.whole(*direction)));
+            one.directions.len()
+        ],
         signs: vec![Signs::Both; one.directions.len()],
         among: count * one.atom.among,
         is_free: false,
@@ -525,12 +525,11 @@ fn additions(weighed: &[Weighed], grams: &Grams, count: f64) -> Vec<Addition> {
     weighed.iter().enumerate().map(of).collect()
 }
 
-/// The width of each coefficient of an atom whose columns have these sizes: the same for all, since they are values of one curve. An atom has
-/// no range, so it is what would make the whole residual where that sees the curve most. With a width of its own, a knot that hardly any
-/// reading sees could have any value.
-fn widths(residual: f64, sizes: &[f64]) -> Vec<f64> {
-    let largest = sizes.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    vec![residual / largest; sizes.len()]
+/// The width of all coefficients of an atom whose columns have these sizes: one, since they are values of one curve. An atom has no range, so
+/// it is what would make the whole residual where that sees the curve most. With a width of its own, a knot that hardly any reading sees
+/// could have any value.
+fn width(residual: f64, sizes: impl Iterator<Item = f64>) -> f64 {
+    residual / sizes.fold(f64::MIN_POSITIVE, f64::max)
 }
 
 /// Those that are behind the first by less than a draft must be ahead of a class.

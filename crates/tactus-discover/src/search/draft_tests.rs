@@ -1,7 +1,7 @@
 use nalgebra::DMatrix;
 
 use super::super::evidence::{Addition, Evidence, Signs};
-use super::widths;
+use super::width;
 
 /// Two knots of a curve explain a residual of 30 standard deviations; a third one is seen by hardly a reading, and the products of its column
 /// are those of rounding.
@@ -19,7 +19,7 @@ fn a_knot_that_hardly_any_reading_sees_has_no_great_value() {
     let additions = [Addition {
         class: 0,
         directions: vec![0, 1, 2],
-        widths: widths(30.0, &sizes),
+        widths: vec![width(30.0, sizes.into_iter()); 3],
         signs: vec![Signs::Both; 3],
         among: 1.0,
         is_free: false,
