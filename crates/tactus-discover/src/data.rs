@@ -32,5 +32,5 @@ pub use floor::Floor;
 pub use frames::Frames;
 pub(crate) use history::History;
 pub use known::Known;
-pub(crate) use motion::{CLEAR_MM, interval_s, load_speeds_mm_per_s, still, turns};
+pub(crate) use motion::{interval_s, load_speeds_mm_per_s, still, turns};
 pub(crate) use noise::{Noise, QUIETEST};

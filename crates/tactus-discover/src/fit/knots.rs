@@ -247,6 +247,19 @@ pub(super) fn is_of_run_time(curve: &FreeCurve) -> bool {
     (curve.at, curve.kind) == ("at_s", CurveKind::Line)
 }
 
+/// True if a curve is one of elements' signals, each as its own counts are over those of a mean gain.
+fn is_of_signal(curve: &FreeCurve) -> bool {
+    (curve.at, curve.of) == ("at_mm", "lost_share")
+}
+
+/// The highest gain of an element over the mean one, as declared; at least 1.
+fn highest_gain(problem: &Problem<'_>) -> f64 {
+    let gains = &problem.predictor.known.response.sensitivity_counts_per_mm;
+    let mean = gains.iter().sum::<f64>() / gains.len() as f64;
+    let highest = gains.iter().copied().fold(mean, f64::max);
+    if mean > 0.0 { highest / mean } else { 1.0 }
+}
+
 /// Places of a curve's knots that the frames can tell apart; none if there are too few.
 pub(crate) fn places(curve: &FreeCurve, problem: &Problem<'_>) -> Vec<f64> {
     let (frames, duration_s) = (problem.predictor.frames, problem.duration_s);
@@ -264,6 +277,7 @@ pub(crate) fn places(curve: &FreeCurve, problem: &Problem<'_>) -> Vec<f64> {
             logarithmic(LEAST_SPEED * fastest, fastest, OF_LINE)
         }
         (_, CurveKind::Weights) => logarithmic(LEAST_THRESHOLD * depth_mm, depth_mm, OF_THRESHOLDS),
+        ("at_mm", _) if is_of_signal(curve) => even(depth_mm * highest_gain(problem), OF_LINE),
         ("at_mm", _) => even(depth_mm, OF_LINE),
         _ => even(1.0, OF_LINE),
     }

@@ -13,8 +13,8 @@
 //! `T` has a mean of 0 and the variance under the root, however large each noise is and however long it remembers. The patterns are all pairs,
 //! those of a row, those of a column, and the product of the two signals.
 //!
-//! A single reading is far out by how much it differs from the mean of the one before and the one after, where the tip rests or is clear of the
-//! surface; all of them count as alternatives (Bonferroni).
+//! A single reading is far out by how much its residual differs from the mean of the one before and the one after, wherever the tip
+//! neither starts nor stops; all of them count as alternatives (Bonferroni).
 //!
 //! # Source
 //! Signs that could as well be others: R. A. Fisher, *The Design of Experiments* (1935), section 21.
@@ -24,7 +24,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::held_out::HeldOutResidual;
-use crate::data::CLEAR_MM;
+use crate::data::turns;
 use crate::fit::Prepared;
 use crate::numbers::upper_tail;
 use crate::search::Scattered;
@@ -100,13 +100,10 @@ impl Prepared<'_> {
                 windows.push(window);
             }
         }
-        let is_quiet = |frame: usize| {
-            is_fitted(frame)
-                && (self.still[frame] >= WINDOW_FRAMES || frames.position_mm[frame][2] > CLEAR_MM)
-        };
+        let is_smooth = |frame: usize| is_fitted(frame) && !turns(frames, frame);
         let is_one_run = |frame: usize| self.whole.run[frame - 1] == self.whole.run[frame + 1];
         let singles: Vec<usize> = (1..frames.len().saturating_sub(1))
-            .filter(|frame| is_one_run(*frame) && (frame - 1..=frame + 1).all(is_quiet))
+            .filter(|frame| is_one_run(*frame) && (frame - 1..=frame + 1).all(is_smooth))
             .collect();
         let at_rest = AtRest {
             elements,
