@@ -13,19 +13,20 @@
 
 mod bins;
 mod contacts;
+mod converter;
 mod error;
 mod faulty;
 mod floor;
 mod frames;
 mod history;
 mod known;
-pub(crate) mod lattice;
 mod motion;
 mod noise;
 pub(crate) mod spectrum;
 
 pub(crate) use bins::{Bins, HeldOut, presses};
 pub(crate) use contacts::Contacts;
+pub(crate) use converter::{Converter, Fault, Gap, Rounding};
 pub use error::DiscoverError;
 pub(crate) use faulty::{Faulty, MISWIRED, rewired};
 pub use floor::Floor;

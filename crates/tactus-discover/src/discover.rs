@@ -4,7 +4,7 @@ use rayon::ThreadPoolBuilder;
 use tactus_model::Effect;
 use tactus_model::effect::Definition;
 
-use crate::data::{Bins, DiscoverError, Floor, Frames, Known};
+use crate::data::{Bins, Converter, DiscoverError, Fault, Floor, Frames, Known, Rounding};
 use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
 use crate::next::Experiments;
 use crate::progress::{Progress, Reporter, Stage};
@@ -12,6 +12,9 @@ use crate::search::{Candidate, Formed, Grown, Memory, Options, Rule, Search, not
 use crate::verdict::{
     BaseModel, Confirmation, Discovery, SearchOutcome, cannot_judge, conclude, confirmation, confirmed,
 };
+
+/// Turns in which a base model and what wider steps do to its counts are fitted to each other. Of a few gaps the first turn knows enough.
+const STEPS_TURNS: usize = 3;
 
 /// Finds which effects a model lacks, by the whole protocol. Next experiments are chosen from those of the rig.
 ///
@@ -41,7 +44,11 @@ fn discover_on_threads(
 ) -> Result<Discovery, DiscoverError> {
     let reporter = Reporter::new(progress);
     reporter.enter(Stage::Base, "recalibrating the base model");
-    let prepared = Prepared::new(known, frames, options.seed)?;
+    let smooth = without_rounding(known, frames, options.seed)?;
+    let prepared = match &smooth {
+        Some((converter, smooth)) => Prepared::read_by(Some(converter.clone()), known, smooth, options.seed)?,
+        None => Prepared::new(known, frames, options.seed)?,
+    };
     if prepared.floor == Floor::None {
         reporter.enter_planning(0);
         return cannot_judge(&prepared, options, experiments);
@@ -57,7 +64,7 @@ fn discover_on_threads(
         candidates: &candidates,
         options,
         known_terms: known.effects.len() + prepared.faulty.effects.len(),
-        rounds: prepared.lattice.is_some(),
+        rounds: prepared.rounds(),
         memory: Memory::default(),
         reporter: &reporter,
     };
@@ -87,6 +94,26 @@ fn discover_on_threads(
         scattered,
     };
     conclude(&prepared, &search, outcome, experiments)
+}
+
+/// The converter, if it is not as declared, and the frames less what it does to a model's counts. That model is fitted to frames without it, so
+/// that each turn knows better where codes begin.
+fn without_rounding(
+    known: &Known,
+    frames: &Frames,
+    seed: u64,
+) -> Result<Option<(Converter, Frames)>, DiscoverError> {
+    let Some(converter) = Converter::seen(frames, known.array.step_counts()) else { return Ok(None) };
+    let rounding = Rounding::of(&converter, &frames.counts);
+    let mut smooth = frames.clone();
+    let turns = if matches!(converter.fault, Fault::WiderSteps(_)) { STEPS_TURNS } else { 1 };
+    for _ in 0..turns {
+        let read = Prepared::read_by(Some(converter.clone()), known, &smooth, seed)?;
+        let next = read.without(&rounding, &frames.counts)?;
+        drop(read);
+        smooth.counts = next;
+    }
+    Ok(Some((converter, smooth)))
 }
 
 /// Compares a draft with new data: how strong it is there, and how much it closes of what a model leaves without it. The model's effects are

@@ -8,7 +8,8 @@ use super::parameters::{Parameters, Term};
 use super::predictor::{Predictor, no_images};
 use super::problem::{Fitted, Problem};
 use crate::data::{
-    Bins, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Noise, lattice, spectrum, still,
+    Bins, Converter, DiscoverError, Fault, Faulty, Floor, Frames, HeldOut, Known, Noise, Rounding, spectrum,
+    still,
 };
 
 /// Least number of fitted presses.
@@ -33,8 +34,8 @@ pub(crate) struct Prepared<'a> {
     pub(crate) replicates: bool,
     /// Step of the converter: as declared, or wider if the readings show this.
     pub(crate) step_counts: f64,
-    /// The wider step, if there is one, and its p-value.
-    pub(crate) lattice: Option<(f64, f64)>,
+    /// The converter, if the readings show that it is not as declared.
+    pub(crate) converter: Option<Converter>,
     /// One frame in each bin.
     pub(crate) whole: Bins,
     pub(crate) bins: Bins,
@@ -49,6 +50,16 @@ pub(crate) struct Prepared<'a> {
 
 impl<'a> Prepared<'a> {
     pub(crate) fn new(known: &'a Known, frames: &'a Frames, seed: u64) -> Result<Self, DiscoverError> {
+        Self::read_by(Converter::seen(frames, known.array.step_counts()), known, frames, seed)
+    }
+
+    /// As [`Prepared::new`], for frames of which the converter is known.
+    pub(crate) fn read_by(
+        converter: Option<Converter>,
+        known: &'a Known,
+        frames: &'a Frames,
+        seed: u64,
+    ) -> Result<Self, DiscoverError> {
         let heldout = HeldOut::choose(frames, seed);
         if heldout.train_presses < PRESSES_LEAST {
             return Err(DiscoverError::TooLittle(format!(
@@ -57,10 +68,10 @@ impl<'a> Prepared<'a> {
             )));
         }
         let still = still(frames);
-        let lattice = lattice::wider_step(frames, known.array.step_counts());
-        let step_counts = lattice.map_or(known.array.step_counts(), |(step_counts, _)| step_counts);
+        let declared_counts = known.array.step_counts();
+        let step_counts = converter.as_ref().map_or(declared_counts, |one| one.step_counts(declared_counts));
         let (mut noise, floor) = Noise::measured(frames, &still, step_counts);
-        if lattice.is_some() {
+        if rounds(converter.as_ref()) {
             // Steps so coarse round small signals the same way in every press.
             noise.repeated_frames = f64::INFINITY;
         }
@@ -106,7 +117,7 @@ impl<'a> Prepared<'a> {
             floor,
             replicates,
             step_counts,
-            lattice,
+            converter,
             whole,
             bins,
             base,
@@ -114,6 +125,30 @@ impl<'a> Prepared<'a> {
             warnings,
             images,
         })
+    }
+
+    /// True if the steps of the converter are wider than declared.
+    pub(crate) fn rounds(&self) -> bool {
+        rounds(self.converter.as_ref())
+    }
+
+    /// Readings without what a converter that is not as declared does to the base model's counts, which repeats wherever signals do: frame by
+    /// frame, element by element.
+    pub(crate) fn without(&self, rounding: &Rounding, readings: &[f32]) -> Result<Vec<f32>, DiscoverError> {
+        let expected = self.predictor(&self.whole).predict(&self.base.parameters)?;
+        let of_steps = self.step_counts.powi(2) / 12.0;
+        let of_element = |rms: &f64| (rms.powi(2) - of_steps).max(0.0).sqrt();
+        let noise_counts: Vec<f64> = self.noise.by_element_counts.iter().map(of_element).collect();
+        let without = |((reading, expected), noise_counts): ((&f32, &f64), &f64)| {
+            // Elements without weight have any noise.
+            if !noise_counts.is_finite() {
+                return *reading;
+            }
+            #[expect(clippy::cast_possible_truncation, reason = "counts are stored in single precision")]
+            let without = rounding.without(f64::from(*reading), *expected, *noise_counts) as f32;
+            without
+        };
+        Ok(readings.iter().zip(&expected).zip(noise_counts.iter().cycle()).map(without).collect())
     }
 
     /// Predictions for some bins.
@@ -130,6 +165,10 @@ impl<'a> Prepared<'a> {
     pub(crate) fn problem_with_silent(&self) -> Problem<'_> {
         Problem::new(self.predictor(&self.bins), &self.noise_of_silent)
     }
+}
+
+fn rounds(converter: Option<&Converter>) -> bool {
+    converter.is_some_and(|one| matches!(one.fault, Fault::WiderSteps(_)))
 }
 
 /// The base model with the effects of faulty elements, fitted to the bins.

@@ -12,7 +12,7 @@ use super::discovery::{
 use super::drafting::{DraftedEffect, Drafting};
 use super::held_out::{HeldOutResidual, closed_share};
 use super::judged::{Judge, Judged, corrected, least_p_value};
-use crate::data::DiscoverError;
+use crate::data::{DiscoverError, Fault, Gap};
 use crate::fit::{Fitted, Parameters, Prepared, RandomWalk};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
@@ -95,9 +95,12 @@ pub(crate) fn conclude(
     let mut not_shown = lacking;
     not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.reach)));
     let mut effects = grown.parameters.effects()?;
-    if let Some((step_counts, p_value)) = &prepared.lattice {
-        effects.push(Effect::new("quantisation", [("step_counts", *step_counts)])?);
-        steps.push(coarse(*step_counts, *p_value, grown_level.heldout_rms_counts));
+    if let Some(converter) = &prepared.converter {
+        let parameters = quantisation(&converter.fault);
+        for of_one in &parameters {
+            effects.push(Effect::new("quantisation", of_one.iter().copied())?);
+        }
+        steps.push(misread(&parameters, converter.p_value, grown_level.heldout_rms_counts));
     }
     let pairs = undecided(&equivalent, &grown);
     search.reporter.enter_planning(pairs.len() + usize::from(with_draft.is_some()));
@@ -110,7 +113,7 @@ pub(crate) fn conclude(
     })?;
 
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
-    let is_added = !names.is_empty() || prepared.lattice.is_some();
+    let is_added = !names.is_empty() || prepared.converter.is_some();
     let share = share_unexplained(verdict, is_added, search.share_left(&base, &grown));
     let mut warnings = prepared.warnings.clone();
     warnings.extend(prepared.not_judged(&of_grown, floor));
@@ -221,11 +224,35 @@ fn undecided(equivalent: &Equivalent, grown: &Fitted) -> Vec<Pair> {
     pairs.collect()
 }
 
-/// The added effect for a converter that is coarser than declared.
-pub(super) fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> AddedEffect {
+/// Parameters of the effects that are a fault of the converter.
+fn quantisation(fault: &Fault) -> Vec<Vec<(&'static str, f64)>> {
+    match fault {
+        Fault::WiderSteps(step_counts) => vec![vec![("step_counts", *step_counts)]],
+        Fault::Gaps(gaps) => {
+            let of_gap = |Gap { ends: [before, after], low_share }: &Gap| {
+                vec![
+                    ("step_counts", 0.0),
+                    ("gap_from_counts", *before),
+                    ("gap_counts", after - before),
+                    ("gap_low_share", *low_share),
+                ]
+            };
+            gaps.iter().map(of_gap).collect()
+        }
+    }
+}
+
+/// The added effect for a converter that is not as declared.
+pub(super) fn misread(
+    parameters: &[Vec<(&'static str, f64)>],
+    p_value: f64,
+    heldout_rms_counts: f64,
+) -> AddedEffect {
+    let estimated =
+        |(name, value): &(&'static str, f64)| Estimated { name, value: *value, standard_error: None };
     AddedEffect {
         effect: "quantisation",
-        terms: vec![vec![Estimated { name: "step_counts", value: step_counts, standard_error: None }]],
+        terms: parameters.iter().map(|of_one| of_one.iter().map(estimated).collect()).collect(),
         p_value,
         q_value: p_value,
         folds_p_value: p_value,

@@ -93,7 +93,7 @@ impl Judge<'_> {
 
     fn judge(&self, confirmed: Confirmed, gave_way: Vec<GivenUp>) -> Result<Judged, DiscoverError> {
         let Self { prepared, search, of_base, .. } = *self;
-        let Prepared { lattice, faulty, .. } = prepared;
+        let Prepared { converter, faulty, .. } = prepared;
         let grown = &confirmed.grown;
         search.reporter.enter(Stage::LocatingLeft, "locating what remains");
         let left = search.left(grown)?;
@@ -111,9 +111,10 @@ impl Judge<'_> {
         let is_named = !names(&grown.parameters, search.known_terms).is_empty();
         let tolerance_counts = search.options.tolerance_counts;
         let evidence = Evidence {
-            is_named: is_named || lattice.is_some() || !faulty.effects.is_empty(),
+            is_named: is_named || converter.is_some() || !faulty.effects.is_empty(),
             is_missing: search.options.rule == Rule::Protocol && (has_gap || has_refused(self.contests)),
-            is_left: is_left || closed.is_some_and(|closed| closed.share < 0.0),
+            is_left,
+            is_further: closed.is_some_and(|closed| closed.share < 0.0),
             upper_noise: levels[1].structured.map_or(f64::INFINITY, |part| part.upper_noise),
             tolerance_noise: tolerance_counts
                 .zip(floor.rms_counts())
@@ -179,8 +180,10 @@ struct Evidence {
     is_named: bool,
     /// A test rejects the base model.
     is_missing: bool,
-    /// A test rejects the grown model, or it is further from the held-out presses than the base model.
+    /// A test rejects the grown model.
     is_left: bool,
+    /// It is further from the held-out presses than the base model: what brings a model no nearer explains nothing, however little is left.
+    is_further: bool,
     /// Upper bound of what is structured in the grown model's residual.
     upper_noise: f64,
     /// The tolerance that was declared beforehand; 0 if none was.
@@ -196,7 +199,7 @@ impl Evidence {
             // No test rejects, but there may be more than one would overlook.
             (false, false) => Verdict::CannotJudge,
             (false, true) => Verdict::Unexplained,
-            (true, _) if is_little || is_seen && !self.is_left => Verdict::Explained,
+            (true, _) if !self.is_further && (is_little || is_seen && !self.is_left) => Verdict::Explained,
             (true, _) => Verdict::PartlyExplained,
         }
     }

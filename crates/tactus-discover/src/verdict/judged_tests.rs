@@ -1,8 +1,14 @@
 use super::*;
 
 /// Effects were named, a test rejects the base model, and none the grown one.
-const NAMED: Evidence =
-    Evidence { is_named: true, is_missing: true, is_left: false, upper_noise: 1.9, tolerance_noise: 0.0 };
+const NAMED: Evidence = Evidence {
+    is_named: true,
+    is_missing: true,
+    is_left: false,
+    is_further: false,
+    upper_noise: 1.9,
+    tolerance_noise: 0.0,
+};
 
 #[test]
 fn names_explain_if_no_test_rejects_and_less_than_twice_the_noise_is_left() {
@@ -13,6 +19,16 @@ fn names_explain_if_no_test_rejects_and_less_than_twice_the_noise_is_left() {
     let tolerable = Evidence { is_left: true, upper_noise: 30.0, tolerance_noise: 31.0, ..NAMED };
     assert_eq!(tolerable.verdict(), Verdict::Explained);
     assert_eq!(Evidence { tolerance_noise: 29.0, ..tolerable }.verdict(), Verdict::PartlyExplained);
+}
+
+#[test]
+fn names_that_bring_the_model_no_nearer_explain_nothing_however_little_is_left() {
+    let further = Evidence { is_further: true, ..NAMED };
+    assert_eq!(further.verdict(), Verdict::PartlyExplained);
+    assert_eq!(
+        Evidence { upper_noise: 0.1, tolerance_noise: 1.0, ..further }.verdict(),
+        Verdict::PartlyExplained
+    );
 }
 
 /// Nine tenths of the variance of a gap of ten times the noise leave three times the noise: 32 % of the rms.

@@ -100,7 +100,12 @@ impl Prepared<'_> {
                 windows.push(window);
             }
         }
-        let is_smooth = |frame: usize| is_fitted(frame) && !turns(frames, frame);
+        // What a converter that is not as declared does to a moving signal is no normal noise.
+        let is_smooth = |frame: usize| {
+            is_fitted(frame)
+                && !turns(frames, frame)
+                && (self.converter.is_none() || self.still[frame] >= WINDOW_FRAMES)
+        };
         let is_one_run = |frame: usize| self.whole.run[frame - 1] == self.whole.run[frame + 1];
         let singles: Vec<usize> = (1..frames.len().saturating_sub(1))
             .filter(|frame| is_one_run(*frame) && (frame - 1..=frame + 1).all(is_smooth))

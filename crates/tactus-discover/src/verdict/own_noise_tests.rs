@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::fixtures::{OPTIONS, known, measured, processes};
 
 const COLS: usize = 6;
 const ELEMENTS: usize = 48;
@@ -83,6 +84,25 @@ fn one_reading_far_out_is_seen_and_slow_changes_are_not() {
     assert!(flipped.p_value < 1e-6, "{flipped:?}");
     let slow = tested(6, 1.0, 0.5, |frame, _| 20.0 * (TAU * frame as f64 / 600.0).sin());
     assert!(slow.p_value > 0.01, "{slow:?}");
+}
+
+#[test]
+fn one_reading_far_out_is_seen_while_the_tool_goes_down() {
+    let known = known();
+    let mut upon = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(79));
+    let tested = |upon: &[Vec<f64>]| {
+        let frames = measured(&known, &[], upon);
+        let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
+        // The third of five frames on the way down, of a press that is fitted.
+        let frame = (0..).map(|press| 30 * press + 7).find(|frame| !prepared.heldout.frames[*frame]).unwrap();
+        (prepared.own_noise(&prepared.held(&prepared.base.parameters).unwrap()), frame)
+    };
+    let (whole, frame) = tested(&upon);
+    assert!(whole.p_value > 0.01, "{whole:?}");
+    upon[frame][20] += 16.0;
+    let (flipped, _) = tested(&upon);
+    assert_eq!(flipped.with, "single readings");
+    assert!(flipped.p_value < 1e-6, "{flipped:?}");
 }
 
 #[test]

@@ -1,36 +1,72 @@
-//! `quantisation`: the converter's steps are coarser than declared.
+//! `quantisation`: the converter's steps are coarser than declared, or it leaves out codes.
 //!
 //! ```text
-//! counts -> step round(counts / step)          before the declared converter; 0: no step
+//! counts -> gap_from           for gap_from < counts < gap_from + gap_low_share gap        before the declared converter
+//!           gap_from + gap     for the rest of the gap;                                    gap = gap_counts; 0: no gap
+//!        -> step round(counts / step)                                                      0: no step
 //! ```
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
 //! | `step_counts` | counts | 0 | 0 to 1000 | step of the converter; 0: no steps |
+//! | `gap_from_counts` | counts | 0 | -1e6 to 1e9 | the code before a gap; no fit varies it |
+//! | `gap_counts` | counts | 0 | 0 to 1e6 | from there to the next code that the converter gives; 0: no gap |
+//! | `gap_low_share` | - | 1 | 0 to 1 | share of the gap, from below, that is read as the code before it |
+//!
+//! A converter with several gaps is as many effects.
 //!
 //! # Source
-//! A converter with fewer effective bits than its word has.
+//! A converter with fewer effective bits than its word has; missing codes: IEEE Std 1241-2010, section 4.7.
 
 use super::{Definition, Make, OnReadout, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "quantisation",
-    summary: "the converter's steps are coarser than declared",
-    parameters: &[Parameter::real("step_counts", 0.0, [0.0, 1000.0])],
+    summary: "the converter's steps are coarser than declared, or it leaves out codes",
+    parameters: &[
+        Parameter::real("step_counts", 0.0, [0.0, 1000.0]),
+        Parameter::given("gap_from_counts", 0.0, [-1e6, 1e9]),
+        Parameter::given("gap_counts", 0.0, [0.0, 1e6]),
+        Parameter::given("gap_low_share", 1.0, [0.0, 1.0]),
+    ],
     near_twins: &["noise_rms_counts"],
     shown_by: &["drift", "hold"],
     curve: None,
-    make: Make::Readout(|values| Box::new(Quantisation { step_counts: values[0] })),
+    make: Make::Readout(|values| {
+        Box::new(Quantisation {
+            step_counts: values[0],
+            gap_from_counts: values[1],
+            gap_counts: values[2],
+            gap_low_share: values[3],
+        })
+    }),
 };
 
 #[derive(Debug)]
 struct Quantisation {
     step_counts: f64,
+    gap_from_counts: f64,
+    gap_counts: f64,
+    gap_low_share: f64,
 }
 
 impl OnReadout for Quantisation {
     fn convert(&self, counts: f64) -> f64 {
-        if self.step_counts > 0.0 { (counts / self.step_counts).round() * self.step_counts } else { counts }
+        let given = self.beside_the_gap(counts);
+        if self.step_counts > 0.0 { (given / self.step_counts).round() * self.step_counts } else { given }
+    }
+}
+
+impl Quantisation {
+    fn beside_the_gap(&self, counts: f64) -> f64 {
+        let beyond = counts - self.gap_from_counts;
+        if beyond <= 0.0 || beyond >= self.gap_counts {
+            counts
+        } else if beyond < self.gap_low_share * self.gap_counts {
+            self.gap_from_counts
+        } else {
+            self.gap_from_counts + self.gap_counts
+        }
     }
 }
 
