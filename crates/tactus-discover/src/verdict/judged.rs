@@ -114,7 +114,8 @@ impl Judge<'_> {
             is_named: is_named || converter.is_some() || !faulty.effects.is_empty(),
             is_missing: search.options.rule == Rule::Protocol && (has_gap || has_refused(self.contests)),
             is_left,
-            is_further: closed.is_some_and(|closed| closed.share < 0.0),
+            is_further: closed
+                .is_some_and(|closed| closed.share + closed.standard_error.unwrap_or(f64::INFINITY) < 0.0),
             upper_noise: levels[1].structured.map_or(f64::INFINITY, |part| part.upper_noise),
             tolerance_noise: tolerance_counts
                 .zip(floor.rms_counts())
@@ -182,7 +183,8 @@ struct Evidence {
     is_missing: bool,
     /// A test rejects the grown model.
     is_left: bool,
-    /// It is further from the held-out presses than the base model: what brings a model no nearer explains nothing, however little is left.
+    /// It is further from the held-out presses than the base model, by more than a standard error: that explains nothing, however little is
+    /// left.
     is_further: bool,
     /// Upper bound of what is structured in the grown model's residual.
     upper_noise: f64,

@@ -22,7 +22,7 @@ fn names_explain_if_no_test_rejects_and_less_than_twice_the_noise_is_left() {
 }
 
 #[test]
-fn names_that_bring_the_model_no_nearer_explain_nothing_however_little_is_left() {
+fn names_that_take_the_model_further_away_explain_nothing_however_little_is_left() {
     let further = Evidence { is_further: true, ..NAMED };
     assert_eq!(further.verdict(), Verdict::PartlyExplained);
     assert_eq!(
