@@ -10,7 +10,7 @@
 //! |---|---|---|---|---|
 //! | `loss_at_1_mm` | - | 0 | 0 to 0.99 | share that a signal of 1 mm loses |
 //! | `knee` | - | 2 | 0.5 to 12 | how sharply the response turns off |
-//! | `counts_share` | - | 0 | 0 to 1 | what saturates: 0 the element's signal, 1 its counts beside those of the mean sensitivity; 0 if not given |
+//! | `counts_share` | - | 0 | 0 to 1 | what saturates: 0 the element's signal, 1 its counts beside those of the mean sensitivity; may be left out |
 //!
 //! | knots | unit | range | meaning |
 //! |---|---|---|---|
