@@ -125,10 +125,11 @@ impl Frequencies {
         if declared_counts <= 0.0 {
             return None;
         }
-        let is_wide =
-            |low: &usize| self.counts[low + 1] - self.counts[*low] > (1.0 + WIDER) * declared_counts;
+        let apart = |low: usize| (self.counts[low + 1] - self.counts[low]) / declared_counts;
+        // Where readings are few, or repeat without noise, the codes beside its ends are not given either.
+        let is_wide = |low: &usize| apart(*low) > 1.0 + WIDER && apart(low - 1).max(apart(low + 1)) < WIDER;
         let is_frequent = |low: &usize| self.times[*low].max(self.times[low + 1]) >= AT_END_LEAST;
-        let places = 0..self.counts.len().saturating_sub(1);
+        let places = 1..self.counts.len().saturating_sub(2);
         let wide: Vec<usize> = places.filter(is_wide).filter(is_frequent).collect();
         if wide.is_empty() || wide.len() > GAPS_MAX {
             return None;

@@ -120,6 +120,18 @@ fn a_whole_converter_has_no_gaps_however_few_or_fast_the_presses_are() {
 }
 
 #[test]
+fn presses_that_repeat_to_the_count_show_no_gaps() {
+    let mut frames = Frames::new(8);
+    for (frame, t_ns) in (0..60 * 30).zip((0..).step_by(33_000_000)) {
+        let share = f32::from(i16::try_from((frame % 30).min(10)).unwrap()) / 10.0;
+        let counts: [f32; 8] =
+            std::array::from_fn(|element| (100.0 + 37.0 * (element as f32) * share).round());
+        frames.push(row(frame / 30, t_ns, &counts));
+    }
+    assert_eq!(Converter::seen(&frames, 1.0), None);
+}
+
+#[test]
 fn a_jump_of_the_signal_is_no_gap_of_codes() {
     let jumps = |counts: f64| if counts > 240.0 { counts + 9.0 } else { counts };
     assert_eq!(Converter::seen(&pressed(5, 60, 25.0, jumps), 1.0), None);
