@@ -91,7 +91,7 @@ fn an_effect_may_have_knots_in_place_of_its_formula() {
     assert_eq!(knots.at, [0.1, 0.1 + 0.2, 0.6]);
     assert_eq!(knots.values, [0.0, 0.1, 1.0 / 3.0]);
     assert_eq!((hardening.effect.value("own_share"), hardening.effect.value("exponent")), (Some(0.25), None));
-    assert_eq!(saturation.effect.parameters().count(), 0);
+    assert_eq!(saturation.effect.parameters().collect::<Vec<_>>(), [("counts_share", 0.0)]);
     let text = model.to_toml().unwrap();
     assert_eq!(Model::from_toml(&text).unwrap(), model, "to the bit: {text}");
 }
