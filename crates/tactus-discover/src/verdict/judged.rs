@@ -114,8 +114,9 @@ impl Judge<'_> {
             is_named: is_named || converter.is_some() || !faulty.effects.is_empty(),
             is_missing: search.options.rule == Rule::Protocol && (has_gap || has_refused(self.contests)),
             is_left,
-            is_further: closed
-                .is_some_and(|closed| closed.share + closed.standard_error.unwrap_or(f64::INFINITY) < 0.0),
+            closed_most: closed.map_or(f64::INFINITY, |closed| {
+                closed.share + closed.standard_error.unwrap_or(f64::INFINITY)
+            }),
             upper_noise: levels[1].structured.map_or(f64::INFINITY, |part| part.upper_noise),
             tolerance_noise: tolerance_counts
                 .zip(floor.rms_counts())
@@ -183,9 +184,9 @@ struct Evidence {
     is_missing: bool,
     /// A test rejects the grown model.
     is_left: bool,
-    /// It is further from the held-out presses than the base model, by more than a standard error: that explains nothing, however little is
-    /// left.
-    is_further: bool,
+    /// The share of the gap on held-out presses that it closes, and a standard error; infinite if that is unknown. Below 0 the model is further
+    /// from them than the base model, which explains nothing, however little is left.
+    closed_most: f64,
     /// Upper bound of what is structured in the grown model's residual.
     upper_noise: f64,
     /// The tolerance that was declared beforehand; 0 if none was.
@@ -196,12 +197,13 @@ impl Evidence {
     fn verdict(self) -> Verdict {
         let is_seen = self.upper_noise < SEEN_NOISE;
         let is_little = self.upper_noise < LITTLE_NOISE.max(self.tolerance_noise);
+        let is_further = self.closed_most < 0.0;
         match (self.is_named, self.is_missing) {
             (false, false) if is_seen => Verdict::NothingMissing,
             // No test rejects, but there may be more than one would overlook.
             (false, false) => Verdict::CannotJudge,
             (false, true) => Verdict::Unexplained,
-            (true, _) if !self.is_further && (is_little || is_seen && !self.is_left) => Verdict::Explained,
+            (true, _) if !is_further && (is_little || is_seen && !self.is_left) => Verdict::Explained,
             (true, _) => Verdict::PartlyExplained,
         }
     }

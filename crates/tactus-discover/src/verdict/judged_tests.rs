@@ -5,7 +5,7 @@ const NAMED: Evidence = Evidence {
     is_named: true,
     is_missing: true,
     is_left: false,
-    is_further: false,
+    closed_most: 1.0,
     upper_noise: 1.9,
     tolerance_noise: 0.0,
 };
@@ -23,7 +23,7 @@ fn names_explain_if_no_test_rejects_and_less_than_twice_the_noise_is_left() {
 
 #[test]
 fn names_that_take_the_model_further_away_explain_nothing_however_little_is_left() {
-    let further = Evidence { is_further: true, ..NAMED };
+    let further = Evidence { closed_most: -0.1, ..NAMED };
     assert_eq!(further.verdict(), Verdict::PartlyExplained);
     assert_eq!(
         Evidence { upper_noise: 0.1, tolerance_noise: 1.0, ..further }.verdict(),
