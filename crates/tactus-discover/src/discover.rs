@@ -4,7 +4,7 @@ use rayon::ThreadPoolBuilder;
 use tactus_model::Effect;
 use tactus_model::effect::Definition;
 
-use crate::data::{Bins, Converter, DiscoverError, Fault, Floor, Frames, Known, Rounding};
+use crate::data::{Bins, Converter, DiscoverError, Floor, Frames, Known, Rounding};
 use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
 use crate::next::Experiments;
 use crate::progress::{Progress, Reporter, Stage};
@@ -44,11 +44,10 @@ fn discover_on_threads(
 ) -> Result<Discovery, DiscoverError> {
     let reporter = Reporter::new(progress);
     reporter.enter(Stage::Base, "recalibrating the base model");
-    let smooth = without_rounding(known, frames, options.seed)?;
-    let prepared = match &smooth {
-        Some((converter, smooth)) => Prepared::read_by(Some(converter.clone()), known, smooth, options.seed)?,
-        None => Prepared::new(known, frames, options.seed)?,
-    };
+    let converter = Converter::seen(frames, known.array.step_counts());
+    let smooth =
+        converter.as_ref().map(|one| without_rounding(one, known, frames, options.seed)).transpose()?;
+    let prepared = Prepared::read_by(converter, known, smooth.as_ref().unwrap_or(frames), options.seed)?;
     if prepared.floor == Floor::None {
         reporter.enter_planning(0);
         return cannot_judge(&prepared, options, experiments);
@@ -96,24 +95,22 @@ fn discover_on_threads(
     conclude(&prepared, &search, outcome, experiments)
 }
 
-/// The converter, if it is not as declared, and the frames less what it does to a model's counts. That model is fitted to frames without it, so
-/// that each turn knows better where codes begin.
+/// The frames less what their converter does to a model's counts. That model is fitted to frames without it, so that each turn knows better
+/// where codes begin.
 fn without_rounding(
+    converter: &Converter,
     known: &Known,
     frames: &Frames,
     seed: u64,
-) -> Result<Option<(Converter, Frames)>, DiscoverError> {
-    let Some(converter) = Converter::seen(frames, known.array.step_counts()) else { return Ok(None) };
-    let rounding = Rounding::of(&converter, &frames.counts);
+) -> Result<Frames, DiscoverError> {
+    let rounding = Rounding::of(converter, &frames.counts);
     let mut smooth = frames.clone();
-    let turns = if matches!(converter.fault, Fault::WiderSteps(_)) { STEPS_TURNS } else { 1 };
+    let turns = if converter.rounds() { STEPS_TURNS } else { 1 };
     for _ in 0..turns {
         let read = Prepared::read_by(Some(converter.clone()), known, &smooth, seed)?;
-        let next = read.without(&rounding, &frames.counts)?;
-        drop(read);
-        smooth.counts = next;
+        smooth.counts = read.without(&rounding, &frames.counts)?;
     }
-    Ok(Some((converter, smooth)))
+    Ok(smooth)
 }
 
 /// Compares a draft with new data: how strong it is there, and how much it closes of what a model leaves without it. The model's effects are

@@ -68,8 +68,13 @@ pub(crate) struct Gap {
 impl Converter {
     /// How the converter of these readings differs from one of the declared step, if they show it.
     pub(crate) fn seen(frames: &Frames, declared_counts: f64) -> Option<Self> {
-        let codes = Frequencies::of(frames);
+        let codes = Frequencies::of(&frames.counts);
         codes.wider_steps(declared_counts).or_else(|| codes.gaps(frames, declared_counts))
+    }
+
+    /// True if its steps are wider than declared.
+    pub(crate) const fn rounds(&self) -> bool {
+        matches!(self.fault, Fault::WiderSteps(_))
     }
 
     /// The step of its readings.
@@ -88,9 +93,9 @@ struct Frequencies {
 }
 
 impl Frequencies {
-    fn of(frames: &Frames) -> Self {
+    fn of(readings: &[f32]) -> Self {
         let mut times: BTreeMap<u32, usize> = BTreeMap::new();
-        for counts in frames.counts.iter().filter(|counts| counts.is_finite()) {
+        for counts in readings.iter().filter(|counts| counts.is_finite()) {
             // Zero has two signs.
             *times.entry((counts + 0.0).to_bits()).or_default() += 1;
         }
@@ -210,10 +215,7 @@ pub(crate) struct Rounding {
 impl Rounding {
     /// That of a converter which gave these readings. A code begins in the middle between it and the one before, or in a gap where it is read.
     pub(crate) fn of(converter: &Converter, readings: &[f32]) -> Self {
-        let finite = readings.iter().filter(|one| one.is_finite());
-        let mut given: Vec<f64> = finite.map(|one| f64::from(*one)).collect();
-        given.sort_by(f64::total_cmp);
-        given.dedup();
+        let given = Frequencies::of(readings).counts;
         let gaps = match &converter.fault {
             Fault::WiderSteps(_) => &[],
             Fault::Gaps(gaps) => &gaps[..],

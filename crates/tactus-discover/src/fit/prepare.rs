@@ -8,8 +8,7 @@ use super::parameters::{Parameters, Term};
 use super::predictor::{Predictor, no_images};
 use super::problem::{Fitted, Problem};
 use crate::data::{
-    Bins, Converter, DiscoverError, Fault, Faulty, Floor, Frames, HeldOut, Known, Noise, Rounding, spectrum,
-    still,
+    Bins, Converter, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Noise, Rounding, spectrum, still,
 };
 
 /// Least number of fitted presses.
@@ -71,7 +70,7 @@ impl<'a> Prepared<'a> {
         let declared_counts = known.array.step_counts();
         let step_counts = converter.as_ref().map_or(declared_counts, |one| one.step_counts(declared_counts));
         let (mut noise, floor) = Noise::measured(frames, &still, step_counts);
-        if rounds(converter.as_ref()) {
+        if converter.as_ref().is_some_and(Converter::rounds) {
             // Steps so coarse round small signals the same way in every press.
             noise.repeated_frames = f64::INFINITY;
         }
@@ -129,7 +128,7 @@ impl<'a> Prepared<'a> {
 
     /// True if the steps of the converter are wider than declared.
     pub(crate) fn rounds(&self) -> bool {
-        rounds(self.converter.as_ref())
+        self.converter.as_ref().is_some_and(Converter::rounds)
     }
 
     /// Readings without what a converter that is not as declared does to the base model's counts, which repeats wherever signals do: frame by
@@ -165,10 +164,6 @@ impl<'a> Prepared<'a> {
     pub(crate) fn problem_with_silent(&self) -> Problem<'_> {
         Problem::new(self.predictor(&self.bins), &self.noise_of_silent)
     }
-}
-
-fn rounds(converter: Option<&Converter>) -> bool {
-    converter.is_some_and(|one| matches!(one.fault, Fault::WiderSteps(_)))
 }
 
 /// The base model with the effects of faulty elements, fitted to the bins.
