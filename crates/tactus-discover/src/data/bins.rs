@@ -98,6 +98,7 @@ impl Bins {
         }
         let bins = run.len();
         first.push(frames.len());
+        counts.shrink_to_fit();
         Ok(Self {
             elements,
             first,
@@ -271,11 +272,10 @@ fn same(one: f64, other: f64) -> bool {
 
 fn path(frames: &Frames, begin: usize, end: usize) -> Result<Trajectory, DiscoverError> {
     let mut last_s = f64::NEG_INFINITY;
-    let points = (begin..end).filter_map(|frame| {
-        let t_s = frames.t_s[frame];
-        let rises = t_s > last_s;
-        last_s = last_s.max(t_s);
-        rises.then_some((t_s, frames.position_mm[frame]))
+    let points = frames.on_way(begin..end).filter_map(|one| {
+        let rises = one.t_s > last_s;
+        last_s = last_s.max(one.t_s);
+        rises.then_some((one.t_s, one.position_mm))
     });
     Trajectory::new(points)
         .map_err(|problem: TrajectoryError| DiscoverError::TooLittle(format!("the stage's path: {problem}")))

@@ -1,10 +1,15 @@
 //! Measured frames, stored by column.
 
+use std::ops::Range;
+
 use tactus_schema::table::{Phase, RowView};
 
+use super::excerpt::Excerpt;
 use super::motion::load_speed_mm_per_s;
+use super::way::WayPoint;
 
-/// Frames of one or more runs, stored by column.
+/// Frames of one or more runs, stored by column. Of a long recording only whole presses from all of it, so that memory and time are bounded:
+/// [`Frames::left_out`] says how many frames are not there.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frames {
     pub(crate) elements: usize,
@@ -24,13 +29,28 @@ pub struct Frames {
     pub(crate) temperature_c: Vec<f32>,
     /// Row-major: frame by frame, element by element.
     pub(crate) counts: Vec<f32>,
+    /// The tip's way where frames are left out.
+    pub(super) way: Vec<WayPoint>,
+    /// The place of each frame among those that were given.
+    pub(super) number: Vec<u64>,
+    pub(super) given: u64,
+    pub(super) excerpt: Excerpt,
     first_ns: i64,
+}
+
+/// A moment of a run: that of a frame, or of a frame that is left out.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OnWay {
+    pub(crate) frame: Option<usize>,
+    pub(crate) t_s: f64,
+    pub(crate) position_mm: [f64; 3],
+    pub(crate) press: i32,
 }
 
 impl Frames {
     /// No frames yet, of an array with this number of elements.
     pub fn new(elements: usize) -> Self {
-        Self { elements, ..Self::default() }
+        Self { elements, excerpt: Excerpt::of_elements(elements), ..Self::default() }
     }
 
     /// Adds the next frame.
@@ -39,8 +59,17 @@ impl Frames {
     /// If the frame does not have one count per element.
     pub fn push(&mut self, frame: RowView<'_>) {
         assert_eq!(frame.counts.len(), self.elements, "one count per element");
-        if self.runs.last().is_none_or(|(run, _)| run != frame.run) {
+        if self.excerpt.is_other_run(frame.run) {
             self.first_ns = frame.t_ns;
+        }
+        let t_s = (frame.t_ns - self.first_ns) as f64 * 1e-9;
+        let reads = self.reads_next(frame.run, frame.press);
+        self.given += 1;
+        if !reads {
+            self.pass(t_s, frame.position_mm, frame.press);
+            return;
+        }
+        if self.runs.last().is_none_or(|(run, _)| run != frame.run) {
             self.runs.push((frame.run.to_owned(), self.len()));
         }
         let known = self.indenters.iter().position(|known| known == frame.indenter);
@@ -50,7 +79,8 @@ impl Frames {
         });
         self.press.push(frame.press);
         self.phase.push(frame.phase);
-        self.t_s.push((frame.t_ns - self.first_ns) as f64 * 1e-9);
+        self.t_s.push(t_s);
+        self.number.push(self.given - 1);
         self.position_mm.push(frame.position_mm);
         self.covering_mm.push(frame.covering_mm);
         self.indenter.push(u16::try_from(indenter).unwrap_or(u16::MAX));
@@ -63,6 +93,7 @@ impl Frames {
         if let Some((_, end)) = self.runs.last_mut() {
             *end += 1;
         }
+        self.fit_in();
     }
 
     /// Number of frames.
@@ -73,6 +104,46 @@ impl Frames {
     /// True if there is no frame.
     pub fn is_empty(&self) -> bool {
         self.t_s.is_empty()
+    }
+
+    /// How many of the frames that were given are not there.
+    pub fn left_out(&self) -> u64 {
+        self.given - self.len() as u64
+    }
+
+    /// For each frame, its place among those that were given.
+    pub fn numbers(&self) -> &[u64] {
+        &self.number
+    }
+
+    /// The tip's way between a frame and the one before, as far as frames are left out there.
+    pub(crate) fn way_to(&self, frame: usize) -> &[WayPoint] {
+        let from = self.way.partition_point(|point| point.before < frame);
+        let count = self.way[from..].partition_point(|point| point.before == frame);
+        &self.way[from..from + count]
+    }
+
+    /// True if frames are left out directly before a frame.
+    pub(crate) fn is_after_gap(&self, frame: usize) -> bool {
+        !self.way_to(frame).is_empty()
+    }
+
+    /// The moments of some frames and of those that are left out before them.
+    pub(crate) fn on_way(&self, frames: Range<usize>) -> impl Iterator<Item = OnWay> {
+        frames.flat_map(|frame| {
+            let left_out = self.way_to(frame).iter().map(|point| OnWay {
+                frame: None,
+                t_s: point.t_s,
+                position_mm: point.position_mm,
+                press: point.press,
+            });
+            left_out.chain([OnWay {
+                frame: Some(frame),
+                t_s: self.t_s[frame],
+                position_mm: self.position_mm[frame],
+                press: self.press[frame],
+            }])
+        })
     }
 
     /// The speed at which presses are loaded; none if no load has two frames.

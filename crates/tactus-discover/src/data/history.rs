@@ -1,7 +1,7 @@
 //! What the sensor has been through before each bin: contact, rest, speed, place and the largest depth so far.
 
 use super::bins::Bins;
-use super::frames::Frames;
+use super::frames::{Frames, OnWay};
 
 /// A sideways move shorter than this has no direction.
 const ASIDE_MM: f64 = 0.05;
@@ -53,10 +53,10 @@ impl History {
                 run = bins.run[bin];
                 state = SensorHistory::default();
             }
-            while next < bins.first[bin + 1] {
-                state.take(frames, next);
-                next += 1;
+            for moment in frames.on_way(next..bins.first[bin + 1]) {
+                state.take(moment);
             }
+            next = bins.first[bin + 1];
             let frame = bins.first[bin];
             let t_s = bins.t_s[bin];
             history.since_contact_s.push(t_s - state.contact_s);
@@ -100,8 +100,8 @@ struct SensorHistory {
 }
 
 impl SensorHistory {
-    fn take(&mut self, frames: &Frames, frame: usize) {
-        let (t_s, at) = (frames.t_s[frame], frames.position_mm[frame]);
+    fn take(&mut self, moment: OnWay) {
+        let OnWay { t_s, position_mm: at, press, .. } = moment;
         let depth_mm = -at[2];
         if let Some((last_s, last)) = self.last {
             let dt_s = (t_s - last_s).max(1e-6);
@@ -125,8 +125,8 @@ impl SensorHistory {
                 }
             }
         }
-        if frames.press[frame] >= 0 && self.press != Some(frames.press[frame]) {
-            self.press = Some(frames.press[frame]);
+        if press >= 0 && self.press != Some(press) {
+            self.press = Some(press);
             self.presses += 1.0;
             self.deepest_before_mm = self.deepest_mm;
         }

@@ -30,7 +30,8 @@ pub(crate) fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
                 (frames.position_mm[frame][axis] - frames.position_mm[anchor][axis]).abs() > STILL_MM
             });
             let clear = [frame, anchor].iter().all(|one| frames.position_mm[*one][2] > clear_mm);
-            if (moved && !clear) || frames.press[frame] != frames.press[anchor] {
+            let is_other = frames.press[frame] != frames.press[anchor] || frames.is_after_gap(frame);
+            if (moved && !clear) || is_other {
                 anchor = frame;
             }
             *still = frame - anchor;

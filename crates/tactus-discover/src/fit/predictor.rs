@@ -110,9 +110,18 @@ impl<'a> Predictor<'a> {
     }
 
     fn moment(&self, bin: usize) -> Moment {
-        let Self { frames, bins, .. } = self;
-        let temperature_c = f64::from(frames.temperature_c[bins.first[bin]]);
-        Moment { t_s: bins.t_s[bin], temperature_c: Some(temperature_c).filter(|c| c.is_finite()) }
+        self.moment_at(bin, self.bins.t_s[bin])
+    }
+
+    /// Moments on the way to a bin at which no frame is read.
+    fn moments_before(&self, bin: usize) -> impl Iterator<Item = Moment> {
+        let way = self.frames.way_to(self.bins.first[bin]);
+        way.iter().map(move |point| self.moment_at(bin, point.t_s))
+    }
+
+    fn moment_at(&self, bin: usize, t_s: f64) -> Moment {
+        let temperature_c = f64::from(self.frames.temperature_c[self.bins.first[bin]]);
+        Moment { t_s, temperature_c: Some(temperature_c).filter(|c| c.is_finite()) }
     }
 
     fn indenter(&self, tool: u16) -> Result<Indenter, DiscoverError> {
@@ -135,11 +144,11 @@ pub(crate) struct Stream<'a> {
     running: Option<Box<Running>>,
 }
 
-/// What the first stages of a model's pipeline give for some bins. The streams of models that differ only in what follows go on from
+/// What the first stages of a model's pipeline give for some bins, and for the way to them of which no frame is read. The streams of models that differ only in what follows go on from
 /// there.
 pub(crate) struct Reached {
     contacts: Vec<Contact>,
-    /// Bin by bin: before the effects of the covering and after each of them.
+    /// Moment by moment: before the effects of the covering and after each of them.
     signals_mm: Vec<f64>,
 }
 
@@ -163,6 +172,9 @@ impl Stream<'_> {
         for bin in first_bin..first_bin + count {
             let path = &predictor.bins.paths[predictor.bins.run[bin]];
             let (moment, pipeline) = (predictor.moment(bin), self.pipeline(bin)?);
+            for moment in predictor.moments_before(bin) {
+                pipeline.pass(moment, path);
+            }
             if wanted(bin) {
                 pipeline.step(moment, path);
             } else {
@@ -185,15 +197,21 @@ impl Stream<'_> {
         let Some(from) = self.from else { return self.take(count, wanted, predicted) };
         let (predictor, first_bin, first) = (self.predictor, self.bin, predicted.len());
         let elements = predictor.bins.elements;
-        let of_bins = reached.signals_mm.chunks_exact(reached.signals_mm.len() / count);
-        for ((bin, contact), signals_mm) in (first_bin..first_bin + count).zip(&reached.contacts).zip(of_bins)
-        {
-            let signal_mm = &signals_mm[from * elements..(from + 1) * elements];
+        let each = reached.signals_mm.len() / reached.contacts.len().max(1);
+        let signals_mm = reached.signals_mm.chunks_exact(each.max(1));
+        let mut reached = reached.contacts.iter().zip(signals_mm);
+        for bin in first_bin..first_bin + count {
             let (moment, pipeline) = (predictor.moment(bin), self.pipeline(bin)?);
-            if wanted(bin) {
-                pipeline.step_on(moment, contact, signal_mm);
-            } else {
-                pipeline.pass_on(moment, contact, signal_mm);
+            let before = predictor.moments_before(bin).map(|moment| (moment, false));
+            for ((moment, wanted), (contact, signals_mm)) in
+                before.chain([(moment, wanted(bin))]).zip(reached.by_ref())
+            {
+                let signal_mm = &signals_mm[from * elements..(from + 1) * elements];
+                if wanted {
+                    pipeline.step_on(moment, contact, signal_mm);
+                } else {
+                    pipeline.pass_on(moment, contact, signal_mm);
+                }
             }
             predicted.extend(pipeline.counts());
         }
@@ -208,8 +226,10 @@ impl Stream<'_> {
         for bin in self.bin..self.bin + count {
             let path = &predictor.bins.paths[predictor.bins.run[bin]];
             let pipeline = self.pipeline(bin)?;
-            pipeline.reach(predictor.moment(bin), path, &mut reached.signals_mm);
-            reached.contacts.push(pipeline.contact().clone());
+            for moment in predictor.moments_before(bin).chain([predictor.moment(bin)]) {
+                pipeline.reach(moment, path, &mut reached.signals_mm);
+                reached.contacts.push(pipeline.contact().clone());
+            }
         }
         self.bin += count;
         Ok(reached)

@@ -76,6 +76,13 @@ impl<'a> Prepared<'a> {
         }
         let replicates = Noise::of(frames, &frames.counts, &still, step_counts).is_some();
         let mut warnings = Vec::new();
+        if frames.left_out() > 0 {
+            warnings.push(format!(
+                "the recording is long: {} of its {} frames are read, whole presses from all of it, and of the others only the tip's way",
+                frames.len(),
+                frames.len() as u64 + frames.left_out()
+            ));
+        }
         if matches!(floor, Floor::Repeats { .. }) {
             warnings.push(
                 "the tip never rests for some frames: the noise is that between presses that repeat each other, and contains what \

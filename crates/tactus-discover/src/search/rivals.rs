@@ -36,7 +36,7 @@ use super::covariates::{Factor, Feature, Form, Forms, LOW_MM};
 use super::evidence::Signs;
 use super::tones::{Point, Tone, clearest, most_per_count};
 use super::varying::varying;
-use crate::data::DiscoverError;
+use crate::data::{DiscoverError, OnWay};
 use crate::fit::{Direction, Fitted, Problem, hat};
 
 /// Knots of a function of one covariate.
@@ -234,13 +234,15 @@ impl Seen {
         let history = forms.history();
         let places = history.place_mm[0].iter().zip(&history.place_mm[1]);
         let largest = |signal: &[f64]| signal.iter().copied().fold(0.0, f64::max);
-        let positions = &problem.predictor.frames.position_mm;
+        let frames = problem.predictor.frames;
         let mut way_mm = 0.0;
-        let mut ways_mm = vec![0.0];
-        ways_mm.extend(positions.windows(2).map(|two| {
-            way_mm += (0..3).map(|axis| (two[1][axis] - two[0][axis]).powi(2)).sum::<f64>().sqrt();
-            way_mm
-        }));
+        let mut last_mm = None;
+        let mut ways_mm = Vec::with_capacity(frames.len());
+        for OnWay { frame, position_mm, .. } in frames.on_way(0..frames.len()) {
+            let from_mm = last_mm.replace(position_mm).unwrap_or(position_mm);
+            way_mm += (0..3).map(|axis| (position_mm[axis] - from_mm[axis]).powi(2)).sum::<f64>().sqrt();
+            ways_mm.extend(frame.map(|_| way_mm));
+        }
         Ok(Self {
             elements,
             centres_mm: (0..elements).filter_map(|element| known.array.centre_mm(element)).collect(),

@@ -48,10 +48,15 @@ impl Sight {
             if before.replace(key).is_some_and(|before| before != key) {
                 trace = Trace::default();
             }
-            let [x_mm, y_mm, z_mm] = tactus_model::Path::at(&bins.paths[bins.run[bin]], bins.t_s[bin]);
             let temperature_c = f64::from(frames.temperature_c[bins.first[bin]]);
             let temperature_c = Some(temperature_c).filter(|c| c.is_finite());
-            trace.take(bins.t_s[bin], known.registration.to_sensor([x_mm, y_mm]), -z_mm, temperature_c);
+            let mut take = |t_s: f64, [x_mm, y_mm, z_mm]: [f64; 3]| {
+                trace.take(t_s, known.registration.to_sensor([x_mm, y_mm]), -z_mm, temperature_c);
+            };
+            for point in frames.way_to(bins.first[bin]) {
+                take(point.t_s, point.position_mm);
+            }
+            take(bins.t_s[bin], tactus_model::Path::at(&bins.paths[bins.run[bin]], bins.t_s[bin]));
             traces.push(trace.clone());
         }
         let mut signal_mm = Vec::with_capacity(at.predicted.len());
