@@ -155,9 +155,9 @@ impl Frames {
         let (mut begin, mut count) = (0, 0);
         for (run, end) in std::mem::take(&mut self.runs) {
             let before = count;
-            for frame in begin..end {
+            for (frame, kept) in (begin..end).zip(&kept[begin..end]) {
                 passed.extend(std::iter::from_fn(|| old.next_if(|point| point.before <= frame)));
-                if kept[frame] {
+                if *kept {
                     way.extend(
                         bends(&passed, self.excerpt.off_mm)
                             .into_iter()
