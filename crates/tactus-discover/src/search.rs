@@ -25,6 +25,7 @@ mod forms;
 mod given_up;
 mod grow;
 mod hold;
+mod jumps;
 mod locate;
 mod memory;
 pub(crate) mod not_shown;

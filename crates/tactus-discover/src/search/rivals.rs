@@ -16,6 +16,7 @@
 //! | speed of travel | the speed of the stage without contact | 1 |
 //! | height above the surface | the tip's height without contact | the image of a press at the tip's place |
 //! | contact | the element, while the tool touches | 1 |
+//! | jump in counts | the element's own counts, above or below a place | 1 |
 //! | tone in counts | the element's own counts | 1 |
 //! | tone in travel | the length of the tip's way | 1 |
 //! | tone in x, in y | the tip's place | the element's own signal |
@@ -34,6 +35,7 @@ use std::sync::Arc;
 
 use super::covariates::{Factor, Feature, Form, Forms, LOW_MM};
 use super::evidence::Signs;
+use super::jumps;
 use super::tones::{Point, Tone, clearest, most_per_count};
 use super::varying::varying;
 use crate::data::{DiscoverError, OnWay};
@@ -136,6 +138,9 @@ pub(crate) fn rivals<'a>(
         Rival::alone("height above the surface", smooth(hats(&height_mm, &low), Form::Place)),
     ];
     found.extend(tones(problem, at, &seen, rounds));
+    if !rounds {
+        found.extend(jump_in_counts(problem, at));
+    }
     found.extend(varying(problem, at, known_terms, history));
     if !rounds {
         let in_contact: Arc<Vec<f64>> =
@@ -146,6 +151,26 @@ pub(crate) fn rivals<'a>(
     }
     found.retain(|rival| !rival.columns.is_empty() || rival.free.is_some());
     Ok(found)
+}
+
+/// A jump in counts: no class has one.
+fn jump_in_counts<'a>(problem: &'a Problem<'_>, at: &'a Fitted) -> Option<Rival<'a>> {
+    let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
+    let weights: Vec<f64> = problem.weights().collect();
+    let readings = residual.iter().zip(&weights).zip(&at.predicted);
+    let points = readings.map(|((residual, weight), counts)| Point {
+        value: *counts,
+        wanted: weight * residual,
+        square: *weight,
+    });
+    let jump = jumps::clearest(&points)?;
+    let elements = problem.predictor.bins.elements;
+    let above = move |bins: Range<usize>| {
+        let counts = &at.predicted[bins.start * elements..bins.end * elements];
+        counts.iter().map(|counts| f64::from(u8::from(*counts >= jump.at))).collect()
+    };
+    let column = Direction::Column(Box::new(above));
+    Some(Rival { among: jump.among, ..Rival::alone("jump in counts", vec![column]) })
 }
 
 /// Tones in counts, in travel, in x and in y.

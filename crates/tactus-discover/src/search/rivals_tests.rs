@@ -3,8 +3,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{hats, rivals};
+use crate::Because;
 use crate::fit::Prepared;
-use crate::fixtures::{ELEMENTS, known, measured};
+use crate::fixtures::{ELEMENTS, found, known, measured};
 
 #[test]
 fn hats_add_up_to_one_and_interpolate() {
@@ -54,4 +55,25 @@ fn the_tone_of_a_coarse_converter_is_no_rival() {
         rivals.iter().any(|rival| rival.name == "tone in counts")
     };
     assert!(has_tone(false) && !has_tone(true));
+}
+
+/// An amplifier changes its range at 250 counts, and the two ranges do not meet. Knots of a covering that hardens follow that.
+#[test]
+fn a_jump_in_counts_is_no_hardening() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let known = known();
+    let clean = measured(&known, &[], &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
+    let upon = (0..30 * ELEMENTS).map(|frame| {
+        let of = |counts: &f32| {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            normal + if *counts > 250.0 { 6.0 } else { 0.0 }
+        };
+        clean.counts_of(frame).iter().map(of).collect()
+    });
+    let frames = measured(&known, &[], &upon.collect::<Vec<_>>());
+    let found = found(&known, &frames);
+    let names: Vec<&str> = found.steps.iter().map(|step| step.effect).collect();
+    assert!(names.is_empty(), "{names:?}");
+    let given_up: Vec<_> = found.given_up.iter().map(|one| (one.effect, &one.because)).collect();
+    assert_eq!(given_up, [("hardening", &Because::Rival("jump in counts"))]);
 }
