@@ -75,7 +75,7 @@ struct TimeArgs {
     #[arg(long, default_value = "target/dist/tactus")]
     tactus: PathBuf,
     /// Numbers of frames, separated by commas.
-    #[arg(long, value_delimiter = ',', default_values_t = [9_000, 36_000, 144_000])]
+    #[arg(long, value_delimiter = ',', default_values_t = [9_000, 36_000, 144_000, 1_000_000])]
     frames: Vec<usize>,
     /// Runs of each size; the median counts.
     #[arg(long, default_value_t = 3)]

@@ -53,10 +53,10 @@ fn discover_on_threads(
         return cannot_judge(&prepared, options, experiments);
     }
     let problem = prepared.problem();
-    let base = prepared.base.clone();
+    let base = &prepared.base;
     reporter.enter(Stage::Locating, "locating where data and base model disagree");
     let lacking = not_shown::lacking(&problem, prepared.replicates);
-    let mut candidates = Candidate::all(&problem, &base, &prepared.frequencies_hz)?;
+    let mut candidates = Candidate::all(&problem, base, &prepared.frequencies_hz)?;
     candidates.retain(|one| lacking.iter().all(|lacking| lacking.effect != one.definition.name));
     let search = Search {
         problem: &problem,
@@ -67,11 +67,11 @@ fn discover_on_threads(
         memory: Memory::default(),
         reporter: &reporter,
     };
-    let before = search.locate(&base)?;
+    let before = search.locate(base)?;
     reporter.enter(Stage::Scattering, "testing the scatter");
-    let scattered = search.scattered(&base)?;
+    let scattered = search.scattered(base)?;
     let Grown { at: grown, rounds, mut equivalent, refused, exchanged, .. } = match options.rule {
-        Rule::Protocol => search.grow(&base)?,
+        Rule::Protocol => search.grow(base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
     let formed = match options.rule {
@@ -81,17 +81,8 @@ fn discover_on_threads(
     let (formed, mut contests) = search.contested(formed, &mut equivalent)?;
     contests.extend(refused);
     let confirmed = confirmed(&prepared, &search, formed, &equivalent)?;
-    let outcome = SearchOutcome {
-        lacking,
-        base,
-        confirmed,
-        rounds,
-        equivalent,
-        contests,
-        exchanged,
-        before,
-        scattered,
-    };
+    let outcome =
+        SearchOutcome { lacking, confirmed, rounds, equivalent, contests, exchanged, before, scattered };
     conclude(&prepared, &search, outcome, experiments)
 }
 
@@ -137,7 +128,7 @@ pub fn predict(
     base: &BaseModel,
     effects: &[Effect],
 ) -> Result<Vec<f32>, DiscoverError> {
-    let bins = Bins::of(frames, false)?;
+    let bins = Bins::of_frames(frames)?;
     let parameters = Parameters {
         sensitivity: base.response.sensitivity_counts_per_mm.clone(),
         run_gain: base.run_gains.clone(),

@@ -31,7 +31,7 @@ pub(crate) struct Bins {
     pub(crate) run: Vec<usize>,
     /// Mean time of the bin's frames since the run's first frame.
     pub(crate) t_s: Vec<f64>,
-    /// Mean counts, bin by bin.
+    /// Mean counts, bin by bin; none of bins that are only predicted.
     pub(crate) counts: Vec<f64>,
     /// Inverse variance of a bin's mean for a noise of one count; 0 for bins that are ignored.
     pub(crate) weight: Vec<f64>,
@@ -58,9 +58,28 @@ pub(crate) struct HeldOut {
 impl Bins {
     /// Bins of several frames where the tip rests (`average`), or of one frame each; not weighted yet.
     pub(crate) fn of(frames: &Frames, average: bool) -> Result<Self, DiscoverError> {
+        let mut bins = Self::divided(frames, average)?;
+        bins.counts = vec![0.0; bins.len() * bins.elements];
+        for (bin, sums) in bins.counts.chunks_exact_mut(bins.elements).enumerate() {
+            let members = bins.first[bin]..bins.first[bin + 1];
+            let count = members.len() as f64;
+            for member in members {
+                for (sum, one) in sums.iter_mut().zip(frames.counts_of(member)) {
+                    *sum += f64::from(*one) / count;
+                }
+            }
+        }
+        Ok(bins)
+    }
+
+    /// Bins of one frame each to be predicted, without counts.
+    pub(crate) fn of_frames(frames: &Frames) -> Result<Self, DiscoverError> {
+        Self::divided(frames, false)
+    }
+
+    fn divided(frames: &Frames, average: bool) -> Result<Self, DiscoverError> {
         let unchanged = unchanged(frames, CLEAR_MM);
-        let elements = frames.elements;
-        let (mut first, mut run, mut t_s, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut first, mut run, mut t_s) = (Vec::new(), Vec::new(), Vec::new());
         let mut begin = 0;
         let mut paths = Vec::new();
         for (index, (_, end)) in frames.runs.iter().enumerate() {
@@ -85,26 +104,18 @@ impl Bins {
                 run.push(index);
                 let count = (next - frame) as f64;
                 t_s.push(frames.t_s[frame..next].iter().sum::<f64>() / count);
-                let at = counts.len();
-                counts.resize(at + elements, 0.0);
-                for member in frame..next {
-                    for (sum, one) in counts[at..].iter_mut().zip(frames.counts_of(member)) {
-                        *sum += f64::from(*one) / count;
-                    }
-                }
                 frame = next;
             }
             begin = *end;
         }
         let bins = run.len();
         first.push(frames.len());
-        counts.shrink_to_fit();
         Ok(Self {
-            elements,
+            elements: frames.elements,
             first,
             run,
             t_s,
-            counts,
+            counts: Vec::new(),
             weight: vec![1.0; bins],
             block: vec![0; bins],
             blocks: 1,

@@ -12,14 +12,12 @@ use super::frames::Frames;
 use super::way::{WayPoint, bends};
 use crate::numbers::Rng;
 
-/// Greatest number of readings that are read: 27 minutes of the paper's sensor.
-const READINGS_MOST: usize = 48 * 48_000;
+/// Greatest number of readings that are read: 23 minutes of the paper's sensor.
+const READINGS_MOST: usize = 48 * 42_000;
 /// A part has at most this share of the frames that may be read.
 const PART_SHARE: usize = 16;
-/// Straight lines leave the way by so much. If it has more points then than frames may be read, by twice as much, and so on up to the size of
-/// an array: then only the ends of what is left out are kept.
+/// Straight lines leave the way by at most so much.
 const OFF_MM: f64 = 0.02;
-const OFF_MOST_MM: f64 = 100.0;
 /// Changes the seed of each group's draw.
 const STREAM: u64 = 0x0065_7863_6572_7074;
 
@@ -38,7 +36,6 @@ pub(super) struct Excerpt {
     reads: bool,
     /// The number and the first frame of each part that is read.
     read: Vec<(u64, usize)>,
-    off_mm: f64,
 }
 
 impl Default for Excerpt {
@@ -64,7 +61,6 @@ impl Excerpt {
             length: 0,
             reads: true,
             read: Vec::new(),
-            off_mm: OFF_MM,
         }
     }
 
@@ -110,7 +106,7 @@ impl Frames {
         let gap = self.way.split_off(self.way.partition_point(|point| point.before < next));
         // Where no frame of a run follows, nobody asks for its way.
         if !is_other_run {
-            self.way.extend(bends(&gap, self.excerpt.off_mm));
+            self.way.extend(bends(&gap, OFF_MM));
         }
         self.shorten_way();
         let number = self.excerpt.parts;
@@ -159,9 +155,7 @@ impl Frames {
                 passed.extend(std::iter::from_fn(|| old.next_if(|point| point.before <= frame)));
                 if *kept {
                     way.extend(
-                        bends(&passed, self.excerpt.off_mm)
-                            .into_iter()
-                            .map(|point| WayPoint { before: count, ..point }),
+                        bends(&passed, OFF_MM).into_iter().map(|point| WayPoint { before: count, ..point }),
                     );
                     passed.clear();
                     count += 1;
@@ -193,12 +187,11 @@ impl Frames {
         retain(&mut self.counts, kept, self.elements);
     }
 
-    /// Makes the way coarser, if it has too many points.
+    /// Forgets the older half of the way before each frame, if it has more points than frames may be read.
     fn shorten_way(&mut self) {
-        while self.way.len() > self.excerpt.frames_most && self.excerpt.off_mm < OFF_MOST_MM {
-            self.excerpt.off_mm *= 2.0;
+        while self.way.len() > self.excerpt.frames_most {
             let gaps = self.way.chunk_by(|one, next| one.before == next.before);
-            self.way = gaps.flat_map(|way| bends(way, self.excerpt.off_mm)).collect();
+            self.way = gaps.flat_map(|gap| &gap[gap.len() / 2..]).copied().collect();
         }
     }
 }

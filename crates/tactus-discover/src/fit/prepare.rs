@@ -35,7 +35,7 @@ pub(crate) struct Prepared<'a> {
     pub(crate) step_counts: f64,
     /// The converter, if the readings show that it is not as declared.
     pub(crate) converter: Option<Converter>,
-    /// One frame in each bin.
+    /// One frame in each bin, without counts.
     pub(crate) whole: Bins,
     pub(crate) bins: Bins,
     /// The base model, recalibrated on the bins.
@@ -96,7 +96,7 @@ impl<'a> Prepared<'a> {
         let noise = noise.without(|element| faulty.is_weightless(element));
         let floor = floor.with_rms(noise.rms_counts);
 
-        let whole = Bins::of(frames, false)?;
+        let whole = Bins::of_frames(frames)?;
         let mut bins = Bins::of(frames, true)?;
         bins.weigh(frames, &noise, &heldout);
         let images = no_images(frames.elements);

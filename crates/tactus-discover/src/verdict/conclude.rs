@@ -24,7 +24,6 @@ use crate::search::{
 pub(crate) struct SearchOutcome {
     /// Effects that were not tried, because the data cannot show them.
     pub(crate) lacking: Vec<NotShown>,
-    pub(crate) base: Fitted,
     pub(crate) confirmed: Confirmed,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
@@ -45,18 +44,10 @@ pub(crate) fn conclude(
     experiments: &dyn Experiments,
 ) -> Result<Discovery, DiscoverError> {
     let options = search.options;
-    let SearchOutcome {
-        lacking,
-        base,
-        confirmed,
-        rounds,
-        mut equivalent,
-        contests,
-        exchanged,
-        before,
-        scattered,
-    } = found;
+    let SearchOutcome { lacking, confirmed, rounds, mut equivalent, contests, exchanged, before, scattered } =
+        found;
     let first = rounds.first();
+    let base = &prepared.base;
     let of_base = prepared.held(&base.parameters)?;
     let of_effects = first.map_or(1.0, |round| round.p_value);
     let own_noise = prepared.own_noise(&of_base);
@@ -114,7 +105,7 @@ pub(crate) fn conclude(
 
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
     let is_added = !names.is_empty() || prepared.converter.is_some();
-    let share = share_unexplained(verdict, is_added, search.share_left(&base, &grown));
+    let share = share_unexplained(verdict, is_added, search.share_left(base, &grown));
     let mut warnings = prepared.warnings.clone();
     warnings.extend(prepared.not_judged(&of_grown, floor));
     warnings.extend(few_presses);
@@ -123,7 +114,7 @@ pub(crate) fn conclude(
         warnings,
         floor,
         global: Some(GlobalTest { statistic: before.statistic, p_value }),
-        curves: search.curves(&base, &grown)?,
+        curves: search.curves(base, &grown)?,
         elements: of_base.elements_beside(&of_grown),
         rounds: rounds.into_iter().map(|tried| with_shares(tried.round, levels[0], noise_counts)).collect(),
         given_up,
