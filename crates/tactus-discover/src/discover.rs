@@ -44,9 +44,7 @@ fn discover_on_threads(
 ) -> Result<Discovery, DiscoverError> {
     let reporter = Reporter::new(progress);
     reporter.enter(Stage::Base, "recalibrating the base model");
-    let converter = Converter::seen(frames, known.array.step_counts());
-    let smooth =
-        converter.as_ref().map(|one| without_rounding(one, known, frames, options.seed)).transpose()?;
+    let (converter, smooth) = without_rounding(known, frames, options.seed)?;
     let prepared = Prepared::read_by(converter, known, smooth.as_ref().unwrap_or(frames), options.seed)?;
     if prepared.floor == Floor::None {
         reporter.enter_planning(0);
@@ -86,22 +84,24 @@ fn discover_on_threads(
     conclude(&prepared, &search, outcome, experiments)
 }
 
-/// The frames less what their converter does to a model's counts. That model is fitted to frames without it, so that each turn knows better
-/// where codes begin.
+/// A converter that is not as declared, and the frames less what it does to a model's counts. That model is fitted to frames without it, so that
+/// each turn knows better where codes begin.
 fn without_rounding(
-    converter: &Converter,
     known: &Known,
     frames: &Frames,
     seed: u64,
-) -> Result<Frames, DiscoverError> {
-    let rounding = Rounding::of(converter, &frames.counts);
+) -> Result<(Option<Converter>, Option<Frames>), DiscoverError> {
+    let Some(converter) = Converter::seen(frames, known.array.step_counts()) else {
+        return Ok((None, None));
+    };
+    let rounding = Rounding::of(&converter, &frames.counts);
     let mut smooth = frames.clone();
     let turns = if converter.rounds() { STEPS_TURNS } else { 1 };
     for _ in 0..turns {
         let read = Prepared::read_by(Some(converter.clone()), known, &smooth, seed)?;
         smooth.counts = read.without(&rounding, &frames.counts)?;
     }
-    Ok(smooth)
+    Ok((Some(converter), Some(smooth)))
 }
 
 /// Compares a draft with new data: how strong it is there, and how much it closes of what a model leaves without it. The model's effects are
@@ -115,7 +115,8 @@ pub fn confirm(
     draft: &'static Definition,
     seed: u64,
 ) -> Result<Confirmation, DiscoverError> {
-    confirmation(&Prepared::new(known, frames, seed)?, draft)
+    let (converter, smooth) = without_rounding(known, frames, seed)?;
+    confirmation(&Prepared::read_by(converter, known, smooth.as_ref().unwrap_or(frames), seed)?, draft)
 }
 
 /// Counts that a model predicts for every frame, without noise: frame by frame, element by element.

@@ -48,11 +48,12 @@ pub(crate) struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
+    #[cfg(test)]
     pub(crate) fn new(known: &'a Known, frames: &'a Frames, seed: u64) -> Result<Self, DiscoverError> {
         Self::read_by(Converter::seen(frames, known.array.step_counts()), known, frames, seed)
     }
 
-    /// As [`Prepared::new`], for frames of which the converter is known.
+    /// Frames, read by a converter that may not be as declared.
     pub(crate) fn read_by(
         converter: Option<Converter>,
         known: &'a Known,
