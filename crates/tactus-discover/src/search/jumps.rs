@@ -13,7 +13,7 @@
 use super::tones::Point;
 
 /// Cells of the covariate's range.
-const CELLS: usize = 1024;
+pub(super) const CELLS: usize = 1024;
 /// On each side of a jump lies at least this share of the weight: the readings of a few presses make no jump.
 const SHARE_LEAST: f64 = 0.005;
 

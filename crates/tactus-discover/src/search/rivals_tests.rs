@@ -1,6 +1,8 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use tactus_model::Covariate;
+use tactus_model::effect::Carrier;
 
 use super::{hats, rivals};
 use crate::Because;
@@ -76,4 +78,9 @@ fn a_jump_in_counts_is_no_hardening() {
     assert!(names.is_empty(), "{names:?}");
     let given_up: Vec<_> = found.given_up.iter().map(|one| (one.effect, &one.because)).collect();
     assert_eq!(given_up, [("hardening", &Because::Rival("jump in counts"))]);
+    let draft = &found.draft.as_ref().unwrap().as_ref().unwrap().draft;
+    assert_eq!((draft.carrier, &*draft.covariates), (Carrier::Counts, &[Covariate::Counts][..]));
+    // By the counts of the base model, of which gains have taken up a part of the jump.
+    let [below, above] = [240.0, 260.0].map(|counts| draft.law.value(&[counts]));
+    assert!(below.abs() < 0.5 && (above - 6.0).abs() < 0.5, "{below} {above}: {}", draft.sentence);
 }

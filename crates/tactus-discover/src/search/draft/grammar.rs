@@ -11,7 +11,11 @@ use tactus_model::effect::{Carrier, When};
 use super::sight::{OF_ELEMENTS, Sight};
 use super::{KNOTS, KNOTS_OF_DISTANCE, KNOTS_OF_SECOND};
 use crate::fit::{Fitted, Problem};
+use crate::search::jumps;
 use crate::search::tones::{Point, clearest, most_per_count};
+
+/// A jump is this share of its covariate's range wide: a cell of those among which it was found.
+const JUMP_SHARE: f64 = 1.0 / jumps::CELLS as f64;
 
 /// A draft without its curve.
 #[derive(Debug, Clone)]
@@ -167,6 +171,9 @@ const PERIODIC: &[Group] = &[
     (Carrier::Counts, When::Always, &[Covariate::Time, Covariate::Counts, Covariate::Travel]),
 ];
 
+/// Jumps: straight lines on both sides of a place.
+const JUMPING: &[Group] = &[(Carrier::Counts, When::Always, &[Covariate::Counts])];
+
 /// All atoms that these data can show. `rounds` if the converter's steps are seen: then a tone in counts is the rounding.
 pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: bool) -> Vec<Atom> {
     let each = |groups: &'static [Group]| {
@@ -201,15 +208,26 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
     }));
     let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
     let weights: Vec<f64> = problem.weights().collect();
-    for (carrier, when, covariate) in each(PERIODIC) {
-        if rounds && covariate == Covariate::Counts {
-            continue;
-        }
-        let points = sight.points(carrier, covariate, when).map(|(reading, value, unit)| Point {
+    let points = |(carrier, when, covariate): Acting| {
+        sight.points(carrier, covariate, when).map(|(reading, value, unit)| Point {
             value,
             wanted: weights[reading] * residual[reading] * unit,
             square: weights[reading] * unit * unit,
-        });
+        })
+    };
+    let is_rounding = |covariate| rounds && covariate == Covariate::Counts;
+    for one in each(JUMPING).filter(|(.., covariate)| !is_rounding(*covariate)) {
+        let Some(jump) = jumps::clearest(&points(one)) else { continue };
+        let (carrier, when, covariate) = one;
+        let [least, most] = sight.range(one);
+        let width = JUMP_SHARE * (most - least);
+        let knots = vec![least, jump.at - width, jump.at, most];
+        if knots.is_sorted() {
+            found.push(Atom { among: jump.among, ..Atom::of(carrier, when, covariate, knots) });
+        }
+    }
+    for (carrier, when, covariate) in each(PERIODIC).filter(|(.., covariate)| !is_rounding(*covariate)) {
+        let points = points((carrier, when, covariate));
         let per_unit_most = if covariate == Covariate::Counts {
             most_per_count(problem.predictor.known.array.step_counts())
         } else {
