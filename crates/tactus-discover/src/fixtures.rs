@@ -69,17 +69,21 @@ fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
     frames
 }
 
-/// The presses' frames: the prediction of a model with effects, plus `upon`, frame by frame, element by element.
-pub(crate) fn measured(known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
-    let blank = frames(known, |_| vec![0.0; ELEMENTS]);
-    let base = BaseModel {
+/// The base model of one run.
+pub(crate) fn base(known: &Known) -> BaseModel {
+    BaseModel {
         psf: known.psf,
         response: known.response.clone(),
         run_gains: vec![1.0],
         run_baselines_counts: vec![vec![100.0; ELEMENTS]],
         run_walks: None,
-    };
-    let clean = predict(known, &blank, &base, effects).unwrap();
+    }
+}
+
+/// The presses' frames: the prediction of a model with effects, plus `upon`, frame by frame, element by element.
+pub(crate) fn measured(known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
+    let blank = frames(known, |_| vec![0.0; ELEMENTS]);
+    let clean = predict(known, &blank, &base(known), effects).unwrap();
     frames(known, |frame| {
         let clean = &clean[frame * ELEMENTS..(frame + 1) * ELEMENTS];
         clean.iter().zip(&upon[frame]).map(|(clean, upon)| f64::from(*clean) + upon).collect()

@@ -16,6 +16,7 @@
 
 mod bic;
 mod candidates;
+mod cells;
 mod contests;
 mod covariates;
 mod draft;

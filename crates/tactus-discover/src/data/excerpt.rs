@@ -1,7 +1,7 @@
 //! Which frames of a long recording are read, so that what a discovery costs is bounded.
 //!
 //! Up to [`READINGS_MOST`] readings all are read. Of a longer recording one part of two is, then one of four, and so on. A part is a press with
-//! the rest that follows it, up to the next press; a longer one than [`PART_SHARE`] of what may be read counts as several. Which one of a
+//! the rest that follows it, up to the next press; one with more than one in [`PART_SHARE`] of the frames that may be read counts as several. Which one of a
 //! group is read is drawn, because presses often come in an order that repeats.
 //!
 //! Of the other parts the tip's way is kept ([`super::way`]), because a covering remembers presses.
@@ -14,7 +14,7 @@ use crate::numbers::Rng;
 
 /// Greatest number of readings that are read: 23 minutes of the paper's sensor.
 const READINGS_MOST: usize = 48 * 42_000;
-/// A part has at most this share of the frames that may be read.
+/// A part has at most one in so many of the frames that may be read.
 const PART_SHARE: usize = 16;
 /// Straight lines leave the way by at most so much.
 const OFF_MM: f64 = 0.02;
@@ -92,8 +92,7 @@ impl Frames {
         if is_other_run || is_other_press || is_full {
             self.next_part(is_other_run);
         }
-        self.excerpt.press = press.max(self.excerpt.press);
-        if is_other_press {
+        if press >= 0 {
             self.excerpt.press = press;
         }
         self.excerpt.length += 1;

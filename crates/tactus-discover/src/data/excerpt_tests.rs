@@ -5,8 +5,8 @@ use tactus_model::effect::Definition;
 use tactus_schema::table::{Phase, RowView};
 
 use super::Excerpt;
-use crate::fixtures::{ELEMENTS, known, measured};
-use crate::{BaseModel, Frames, predict};
+use crate::fixtures::{ELEMENTS, base, known, measured};
+use crate::{Frames, predict};
 
 fn of_most(elements: usize, frames_most: usize) -> Frames {
     let mut frames = Frames::new(elements);
@@ -118,14 +118,7 @@ fn a_frame_that_is_read_is_as_it_was_given() {
 /// What the model predicts for the frames that are read.
 fn predicted(frames: &Frames, effects: &[Effect]) -> Vec<f32> {
     let known = known();
-    let base = BaseModel {
-        psf: known.psf,
-        response: known.response.clone(),
-        run_gains: vec![1.0],
-        run_baselines_counts: vec![vec![100.0; ELEMENTS]],
-        run_walks: None,
-    };
-    predict(&known, frames, &base, effects).unwrap()
+    predict(&known, frames, &base(&known), effects).unwrap()
 }
 
 #[test]

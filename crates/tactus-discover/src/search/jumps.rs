@@ -10,7 +10,7 @@
 //! # Source
 //! A. Sen and M. S. Srivastava, *Ann. Stat.* 3 (1975) 98: a change of the mean at an unknown place.
 
-use super::tones::Point;
+use super::cells::{Cells, Point};
 
 /// Cells of the covariate's range.
 pub(super) const CELLS: usize = 1024;
@@ -27,29 +27,17 @@ pub(super) struct Jump {
 
 /// The clearest jump; `None` if the covariate does not vary.
 pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone)) -> Option<Jump> {
-    let weighed = || points.clone().filter(|point| point.square > 0.0);
-    let least = weighed().map(|point| point.value).fold(f64::INFINITY, f64::min);
-    let most = weighed().map(|point| point.value).fold(f64::NEG_INFINITY, f64::max);
-    let range = most - least;
-    if !(range > 0.0 && range.is_finite()) {
-        return None;
-    }
-    let mut cells = vec![[0.0; 2]; CELLS];
-    for point in weighed() {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to CELLS")]
-        let cell = (((point.value - least) / range * CELLS as f64) as usize).min(CELLS - 1);
-        cells[cell][0] += point.wanted;
-        cells[cell][1] += point.square;
-    }
-    let [wanted, square] = cells.iter().fold([0.0; 2], |[q, s], [one, other]| [q + one, s + other]);
+    let cells = Cells::of(points, CELLS)?;
+    let [wanted, square] = cells.total();
     let mut best: Option<(f64, usize)> = None;
     let mut among = 0.0;
     let (mut above_wanted, mut above_square) = (0.0, 0.0);
     for cell in (1..CELLS).rev() {
-        above_wanted += cells[cell][0];
-        above_square += cells[cell][1];
+        let [of_wanted, of_square] = cells.sums[cell];
+        above_wanted += of_wanted;
+        above_square += of_square;
         let share = above_square / square;
-        if cells[cell][1] == 0.0 || !(SHARE_LEAST..=1.0 - SHARE_LEAST).contains(&share) {
+        if of_square == 0.0 || !(SHARE_LEAST..=1.0 - SHARE_LEAST).contains(&share) {
             continue;
         }
         among += 1.0;
@@ -58,7 +46,7 @@ pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone)) -> Option
             best = Some((power, cell));
         }
     }
-    best.map(|(_, cell)| Jump { at: least + cell as f64 / CELLS as f64 * range, among })
+    best.map(|(_, cell)| Jump { at: cells.least + cell as f64 / CELLS as f64 * cells.range, among })
 }
 
 #[cfg(test)]

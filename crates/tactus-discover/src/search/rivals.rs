@@ -33,10 +33,11 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::cells::Point;
 use super::covariates::{Factor, Feature, Form, Forms, LOW_MM};
 use super::evidence::Signs;
 use super::jumps;
-use super::tones::{Point, Tone, clearest, most_per_count};
+use super::tones::{Tone, clearest, most_per_count};
 use super::varying::varying;
 use crate::data::{DiscoverError, OnWay};
 use crate::fit::{Direction, Fitted, Problem, hat};

@@ -13,6 +13,7 @@
 //! # Source
 //! J. D. Scargle, *Astrophys. J.* 263 (1982) 835: the periodogram, and the false alarms of its greatest power.
 
+use super::cells::{Cells, Point};
 use crate::data::spectrum::transform;
 
 /// Cells of the covariate's range; the transform has several times as many points, so that no tone lies between two frequencies.
@@ -34,16 +35,6 @@ pub(super) struct Tone {
     pub(super) among: f64,
 }
 
-/// A reading, or a sum of some at one value of the covariate.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Point {
-    pub(super) value: f64,
-    /// Weight times residual times what the tone multiplies.
-    pub(super) wanted: f64,
-    /// Weight times the square of what the tone multiplies.
-    pub(super) square: f64,
-}
-
 /// Most periods per count of a tone in counts.
 pub(super) fn most_per_count(step_counts: f64) -> f64 {
     (STEPS_LEAST * step_counts).recip()
@@ -51,23 +42,11 @@ pub(super) fn most_per_count(step_counts: f64) -> f64 {
 
 /// The clearest tone of at most so many periods per unit; `None` if the covariate does not vary, or not by enough for one.
 pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone), per_unit_most: f64) -> Option<Tone> {
-    let weighed = || points.clone().filter(|point| point.square > 0.0);
-    let least = weighed().map(|point| point.value).fold(f64::INFINITY, f64::min);
-    let most = weighed().map(|point| point.value).fold(f64::NEG_INFINITY, f64::max);
-    let range = most - least;
-    if !(range > 0.0 && range.is_finite()) {
-        return None;
-    }
-    let (mut wanted, mut squares) = (vec![0.0; CELLS], vec![0.0; CELLS]);
-    for point in weighed() {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to CELLS")]
-        let cell = (((point.value - least) / range * CELLS as f64) as usize).min(CELLS - 1);
-        wanted[cell] += point.wanted;
-        squares[cell] += point.square;
-    }
-    let mean = wanted.iter().sum::<f64>() / squares.iter().sum::<f64>();
+    let cells = Cells::of(points, CELLS)?;
+    let (range, [wanted, square]) = (cells.range, cells.total());
+    let mean = wanted / square;
     let mut series = vec![[0.0; 2]; FINER * CELLS];
-    for (at, (wanted, square)) in series.iter_mut().zip(wanted.iter().zip(&squares)) {
+    for (at, [wanted, square]) in series.iter_mut().zip(&cells.sums) {
         at[0] = wanted - mean * square;
     }
     transform(&mut series);

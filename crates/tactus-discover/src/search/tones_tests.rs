@@ -1,7 +1,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Point, clearest, most_per_count};
+use super::{clearest, most_per_count};
+use crate::search::cells::Point;
 
 fn points(values: &[f64], residual: impl Fn(f64) -> f64) -> Vec<Point> {
     values.iter().map(|value| Point { value: *value, wanted: residual(*value), square: 1.0 }).collect()

@@ -11,8 +11,9 @@ use tactus_model::effect::{Carrier, When};
 use super::sight::{OF_ELEMENTS, Sight};
 use super::{KNOTS, KNOTS_OF_DISTANCE, KNOTS_OF_SECOND};
 use crate::fit::{Fitted, Problem};
+use crate::search::cells::Point;
 use crate::search::jumps;
-use crate::search::tones::{Point, clearest, most_per_count};
+use crate::search::tones::{clearest, most_per_count};
 
 /// A jump is this share of its covariate's range wide: a cell of those among which it was found.
 const JUMP_SHARE: f64 = 1.0 / jumps::CELLS as f64;
