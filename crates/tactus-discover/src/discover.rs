@@ -115,8 +115,7 @@ pub fn confirm(
     draft: &'static Definition,
     seed: u64,
 ) -> Result<Confirmation, DiscoverError> {
-    let (converter, smooth) = without_rounding(known, frames, seed)?;
-    confirmation(&Prepared::read_by(converter, known, smooth.as_ref().unwrap_or(frames), seed)?, draft)
+    confirmation(&Prepared::new(known, frames, seed)?, draft)
 }
 
 /// Counts that a model predicts for every frame, without noise: frame by frame, element by element.

@@ -48,7 +48,6 @@ pub(crate) struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    #[cfg(test)]
     pub(crate) fn new(known: &'a Known, frames: &'a Frames, seed: u64) -> Result<Self, DiscoverError> {
         Self::read_by(Converter::seen(frames, known.array.step_counts()), known, frames, seed)
     }
