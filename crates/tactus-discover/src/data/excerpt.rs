@@ -1,8 +1,8 @@
 //! Which frames of a long recording are read, so that what a discovery costs is bounded.
 //!
 //! Up to [`READINGS_MOST`] readings all are read. Of a longer recording one part of two is, then one of four, and so on. A part is a press with
-//! the rest that follows it, up to the next press; one with more than one in [`PART_SHARE`] of the frames that may be read counts as several. Which one of a
-//! group is read is drawn, because presses often come in an order that repeats.
+//! the rest that follows it, up to the next press; one with more than one in [`PART_SHARE`] of the frames that may be read counts as several.
+//! Which one of a group is read is drawn, because presses often come in an order that repeats.
 //!
 //! Of the other parts the tip's way is kept ([`super::way`]), because a covering remembers presses.
 //!

@@ -144,8 +144,8 @@ pub(crate) struct Stream<'a> {
     running: Option<Box<Running>>,
 }
 
-/// What the first stages of a model's pipeline give for some bins, and for the way to them of which no frame is read. The streams of models that differ only in what follows go on from
-/// there.
+/// What the first stages of a model's pipeline give for some bins, and for the way to them of which no frame is read. The streams of models
+/// that differ only in what follows go on from there.
 pub(crate) struct Reached {
     contacts: Vec<Contact>,
     /// Moment by moment: before the effects of the covering and after each of them.

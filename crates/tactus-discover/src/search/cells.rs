@@ -10,6 +10,12 @@ pub(super) struct Point {
     pub(super) square: f64,
 }
 
+/// Points of equal weight, with a residual that follows the value.
+#[cfg(test)]
+pub(super) fn points(values: &[f64], residual: impl Fn(f64) -> f64) -> Vec<Point> {
+    values.iter().map(|value| Point { value: *value, wanted: residual(*value), square: 1.0 }).collect()
+}
+
 /// Cells of equal width over the range of the covariate.
 pub(super) struct Cells {
     pub(super) least: f64,

@@ -2,11 +2,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{CELLS, clearest};
-use crate::search::cells::Point;
-
-fn points(values: &[f64], residual: impl Fn(f64) -> f64) -> Vec<Point> {
-    values.iter().map(|value| Point { value: *value, wanted: residual(*value), square: 1.0 }).collect()
-}
+use crate::search::cells::{Point, points};
 
 #[test]
 fn a_jump_is_found_under_noise() {

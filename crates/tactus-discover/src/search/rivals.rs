@@ -138,10 +138,7 @@ pub(crate) fn rivals<'a>(
         Rival::alone("speed of travel", smooth(hats(&history.travel_mm_per_s, &free), Form::Offset)),
         Rival::alone("height above the surface", smooth(hats(&height_mm, &low), Form::Place)),
     ];
-    found.extend(tones(problem, at, &seen, rounds));
-    if !rounds {
-        found.extend(jump_in_counts(problem, at));
-    }
+    found.extend(picked(problem, at, &seen, rounds));
     found.extend(varying(problem, at, known_terms, history));
     if !rounds {
         let in_contact: Arc<Vec<f64>> =
@@ -154,28 +151,8 @@ pub(crate) fn rivals<'a>(
     Ok(found)
 }
 
-/// A jump in counts: no class has one.
-fn jump_in_counts<'a>(problem: &'a Problem<'_>, at: &'a Fitted) -> Option<Rival<'a>> {
-    let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
-    let weights: Vec<f64> = problem.weights().collect();
-    let readings = residual.iter().zip(&weights).zip(&at.predicted);
-    let points = readings.map(|((residual, weight), counts)| Point {
-        value: *counts,
-        wanted: weight * residual,
-        square: *weight,
-    });
-    let jump = jumps::clearest(&points)?;
-    let elements = problem.predictor.bins.elements;
-    let above = move |bins: Range<usize>| {
-        let counts = &at.predicted[bins.start * elements..bins.end * elements];
-        counts.iter().map(|counts| f64::from(u8::from(*counts >= jump.at))).collect()
-    };
-    let column = Direction::Column(Box::new(above));
-    Some(Rival { among: jump.among, ..Rival::alone("jump in counts", vec![column]) })
-}
-
-/// Tones in counts, in travel, in x and in y.
-fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>, rounds: bool) -> Vec<Rival<'a>> {
+/// Those of which the residual picks the clearest: tones in counts, in travel, in x and in y, and a jump in counts.
+fn picked<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>, rounds: bool) -> Vec<Rival<'a>> {
     let bins = problem.predictor.bins;
     let elements = seen.elements;
     let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
@@ -208,32 +185,45 @@ fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>, rounds:
         };
         Some(rival(name, &tone, [factor(f64::sin), factor(f64::cos)]))
     };
-    let in_counts = || {
-        let readings = residual.iter().zip(&weights).zip(&at.predicted);
-        let points = readings.map(|((residual, weight), counts)| Point {
-            value: *counts,
-            wanted: weight * residual,
-            square: *weight,
-        });
-        let tone = clearest(&points, most_per_count(problem.predictor.known.array.step_counts()))?;
-        let column = |wave: fn(f64) -> f64| -> Direction<'a> {
-            Direction::Column(Box::new(move |bins: Range<usize>| {
-                let counts = &at.predicted[bins.start * elements..bins.end * elements];
-                counts.iter().map(|counts| wave(TAU * tone.per_unit * counts)).collect()
-            }))
-        };
+    let readings = residual.iter().zip(&weights).zip(&at.predicted);
+    let by_counts = readings.map(|((residual, weight), counts)| Point {
+        value: *counts,
+        wanted: weight * residual,
+        square: *weight,
+    });
+    let tone_in_counts = || {
+        let tone = clearest(&by_counts, most_per_count(problem.predictor.known.array.step_counts()))?;
+        let column =
+            |wave: fn(f64) -> f64| of_counts(at, elements, move |counts| wave(TAU * tone.per_unit * counts));
         Some(rival("tone in counts", &tone, [column(f64::sin), column(f64::cos)]))
+    };
+    let jump_in_counts = || {
+        let jump = jumps::clearest(&by_counts)?;
+        let column = of_counts(at, elements, move |counts| f64::from(u8::from(counts >= jump.at)));
+        Some(Rival { among: jump.among, ..Rival::alone("jump in counts", vec![column]) })
     };
     let signal = |reading: usize| seen.signal(reading / elements, reading % elements);
     let place = |axis: usize| seen.place_mm.iter().map(|place| place[axis]).collect();
     let found = [
         // The tone of a coarse converter is its rounding, which is known by then.
-        if rounds { None } else { in_counts() },
+        if rounds { None } else { tone_in_counts() },
         of_bins("tone in travel", seen.travel_mm.clone(), Form::Offset, &|_| 1.0),
         of_bins("tone in x", place(0), Form::Signal, &signal),
         of_bins("tone in y", place(1), Form::Signal, &signal),
+        if rounds { None } else { jump_in_counts() },
     ];
     found.into_iter().flatten().collect()
+}
+
+/// A column of a function of the counts that a model predicts.
+fn of_counts<'a>(
+    at: &'a Fitted,
+    elements: usize,
+    of: impl Fn(f64) -> f64 + Send + Sync + 'a,
+) -> Direction<'a> {
+    Direction::Column(Box::new(move |bins: Range<usize>| {
+        at.predicted[bins.start * elements..bins.end * elements].iter().map(|counts| of(*counts)).collect()
+    }))
 }
 
 /// What rivals are functions of, at a model.

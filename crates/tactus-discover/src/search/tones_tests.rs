@@ -2,11 +2,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{clearest, most_per_count};
-use crate::search::cells::Point;
-
-fn points(values: &[f64], residual: impl Fn(f64) -> f64) -> Vec<Point> {
-    values.iter().map(|value| Point { value: *value, wanted: residual(*value), square: 1.0 }).collect()
-}
+use crate::search::cells::{Point, points};
 
 #[test]
 fn a_tone_is_found_at_values_that_are_not_spaced_evenly() {
