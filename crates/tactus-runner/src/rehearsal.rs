@@ -1,7 +1,7 @@
 //! The rehearsal of an experiment: what the rig would do, without the rig.
 //!
-//! The experiment's own script runs as in a dry run ([`crate::twin`]): with the engine and the drivers of a run, on the rig's twin, in
-//! virtual time. The rehearsal keeps what a run would record. On an embedded rig a run with the same seed moves exactly so.
+//! The experiment's own script runs as in a dry run ([`crate::twin`]), on the rig's twin, in virtual time, but also with the drivers and the
+//! device bytes of a run. The rehearsal keeps what a run would record. On an embedded rig a run with the same seed moves exactly so.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,7 +14,7 @@ use tactus_schema::table::RowView;
 use tactus_schema::{Frame, Rig, TimeStamp, WallTime, pb};
 use tactus_virtual::twin_of;
 
-use crate::twin::{self, TwinError};
+use crate::twin::{self, Links, TwinError};
 
 /// What the rig would do in an experiment.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ pub fn rehearse(
         simulation.faults = faults;
     }
     let kept = Kept::default();
-    let outcome = twin::run_on(twin, order, longest, Box::new(kept.clone()), &stopped)?;
+    let outcome = twin::run_on(twin, Links::Bytes, order, longest, Box::new(kept.clone()), &stopped)?;
     let messages = std::mem::take(&mut *kept.messages());
     let of_frame =
         |message: &Message| if let Message::Frame(frame) = message { Some(frame.clone()) } else { None };

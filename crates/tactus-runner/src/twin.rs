@@ -1,14 +1,20 @@
-//! The dry run: the same engine and drivers on a simulated twin of the rig, in virtual time.
+//! The dry run: the same engine on a simulated twin of the rig, in virtual time.
+//!
+//! The twin's devices have no wires ([`UnwiredRig`]): the engine is the one that moves the rig, with its supervisor, permits and
+//! procedures, but nothing is encoded, sent and decoded.
 
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
 use tactus_device::{Clock, SensorCodec};
-use tactus_engine::{Engine, Planned, Record, RunOrder, RunOutcome, StopOrder, Unpublished, Unrecorded};
+use tactus_engine::{
+    Devices, Engine, Planned, Record, RunOrder, RunOutcome, StopOrder, Unpublished, Unrecorded,
+};
 use tactus_schema::rig::Transport;
 use tactus_schema::{Rig, pb};
-use tactus_virtual::{Truth, twin_of};
+use tactus_virtual::{Truth, UnwiredRig, twin_of};
 use tokio::time::timeout;
 use tracing::subscriber::NoSubscriber;
 
@@ -100,13 +106,23 @@ impl DryRun {
 /// # Errors
 /// [`TwinError`] if there was no dry run. A refused step is no error: the [`DryRun`] is then not possible.
 pub fn dry_run(rig: &Rig, order: RunOrder, attendant: &dyn Attend) -> Result<DryRun, TwinError> {
-    let outcome = run_on(twin_of(rig), order, LONGEST, Box::new(Unrecorded), attendant)?;
+    let outcome = run_on(twin_of(rig), Links::None, order, LONGEST, Box::new(Unrecorded), attendant)?;
     Ok(DryRun { outcome })
+}
+
+/// What connects a twin's devices with the engine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Links {
+    /// Nothing.
+    None,
+    /// Device bytes and drivers, as in a run.
+    Bytes,
 }
 
 /// Runs an experiment on a twin in virtual time, for at most `longest` of it. As [`dry_run`] otherwise.
 pub(crate) fn run_on(
     mut twin: Rig,
+    links: Links,
     mut order: RunOrder,
     longest: Duration,
     record: Box<dyn Record>,
@@ -127,7 +143,7 @@ pub(crate) fn run_on(
     let thread = thread::Builder::new().name("twin".into()).spawn(move || {
         // The twin's log entries are no events of the service.
         tracing::subscriber::with_default(NoSubscriber::new(), || {
-            virtual_time::runtime()?.block_on(run(twin, order, longest, record, &started))
+            virtual_time::runtime()?.block_on(run(twin, links, order, longest, record, &started))
         })
     })?;
     attend(&engines, outline.as_ref(), attendant);
@@ -163,6 +179,7 @@ fn attend(engines: &Receiver<Engine>, outline: Option<&Outline>, attendant: &dyn
 
 async fn run(
     twin: Rig,
+    links: Links,
     order: RunOrder,
     longest: Duration,
     record: Box<dyn Record>,
@@ -172,15 +189,29 @@ async fn run(
     let Some(service) = twin.service.clone() else {
         return Err(tactus_engine::EngineError::NoService { rig: twin.name }.into());
     };
-    // Steps do not depend on the sensor's protocol: the twin uses one that needs no description.
-    let codec = SensorCodec::default();
-    let opened = devices::open(&twin, &service, codec, || Truth::of_rig(&twin, order.seed), clock);
-    let engine = Engine::start(twin, opened.devices, clock, std::sync::Arc::new(Unpublished))?;
+    let truth = Truth::of_rig(&twin, order.seed);
+    let devices = match links {
+        Links::None => unwired(UnwiredRig::start(&twin, truth, clock)),
+        // Steps do not depend on the sensor's protocol: the twin uses one that needs no description.
+        Links::Bytes => devices::open(&twin, &service, SensorCodec::default(), || truth, clock).devices,
+    };
+    let engine = Engine::start(twin, devices, clock, Arc::new(Unpublished))?;
     // There is room: this is the only message. The receiver waits for the thread's end.
     let _told = started.try_send(engine.clone());
     match timeout(longest, engine.run(order, record)).await {
         Ok(Ok(outcome)) => Ok(outcome),
         Ok(Err(busy)) => unreachable!("a new engine has no other run: {busy}"),
         Err(_) => Err(TwinError::TooLong(longest)),
+    }
+}
+
+fn unwired(rig: UnwiredRig) -> Devices {
+    let change_covering = Arc::new(rig.change_covering());
+    Devices {
+        sensor: Box::new(rig.sensor),
+        stage: rig.stage,
+        stage_reports: rig.reports,
+        change_covering: Some(change_covering),
+        covering_memory: None,
     }
 }

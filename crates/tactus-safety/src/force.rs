@@ -6,8 +6,9 @@ use tactus_schema::{Frame, MonoTime, Rig};
 use crate::Violation;
 use crate::limits::Limits;
 
-/// Readings without load, in counts; `None` for an element that was not read then.
-type Zero = Vec<Option<f64>>;
+/// Readings without load, in counts, by element; NaN for an element that has none. A rise above it is NaN, which is over no limit:
+/// plain numbers, because every frame of every rig is held against them.
+type Zero = Vec<f64>;
 
 /// The array's elements as the supervisor knows them.
 #[derive(Debug)]
@@ -16,19 +17,13 @@ pub(crate) struct Elements {
     /// The run's first zero. It limits the load beside the tare, so that repeated taring cannot raise the limit step by step.
     reference: Option<Zero>,
     tare: Option<Zero>,
-    /// By index; as many as the last frame had.
-    states: Vec<ElementState>,
+    /// The last frame, by element; NaN for an element that was not read in it.
+    counts: Vec<f64>,
+    /// When each element was last read.
+    last_read: Vec<Option<MonoTime>>,
     last_frame: Option<MonoTime>,
     /// Silences before this were dealt with.
     excused: Option<MonoTime>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct ElementState {
-    counts: f64,
-    last_read: Option<MonoTime>,
-    /// In the last frame.
-    is_read: bool,
 }
 
 /// What the rig file says of the elements, by index.
@@ -48,7 +43,7 @@ impl Elements {
         let envelope = &service.envelope;
         let unwatched = envelope.unwatched_elements.clone();
         let baseline =
-            |(element, counts): (usize, &f64)| Some(*counts).filter(|_| !unwatched.contains(&element));
+            |(element, counts): (usize, &f64)| if unwatched.contains(&element) { f64::NAN } else { *counts };
         Self {
             rig: Expected {
                 baseline_counts: rig.baseline_counts.iter().enumerate().map(baseline).collect(),
@@ -59,7 +54,8 @@ impl Elements {
             },
             reference: None,
             tare: None,
-            states: Vec::new(),
+            counts: Vec::new(),
+            last_read: Vec::new(),
             last_frame: None,
             excused: None,
         }
@@ -72,7 +68,7 @@ impl Elements {
 
     /// True if any element has a zero: without one the array is blind.
     pub(crate) fn has_zero(&self) -> bool {
-        self.reference.as_ref().is_some_and(|zero| zero.iter().any(Option::is_some))
+        self.reference.as_ref().is_some_and(|zero| zero.iter().any(|counts| !counts.is_nan()))
     }
 
     /// Discards the zeros: until new ones are taken, loads are held against the rig file's baseline.
@@ -85,24 +81,22 @@ impl Elements {
     /// no watched element: it shows no load, and counts as none.
     pub(crate) fn take(&mut self, frame: &Frame) -> bool {
         let at = frame.received.mono;
-        let unread = ElementState { counts: 0.0, last_read: None, is_read: false };
-        self.states.resize(frame.counts.len(), unread);
-        for (state, counts) in self.states.iter_mut().zip(frame.counts.iter()) {
-            state.is_read = counts.is_finite();
-            state.counts = f64::from(*counts);
-        }
+        self.counts.clear();
+        let read = |counts: &f32| if counts.is_finite() { f64::from(*counts) } else { f64::NAN };
+        self.counts.extend(frame.counts.iter().map(read));
         for element in frame.bad_elements.iter() {
-            let state = usize::try_from(*element).ok().and_then(|element| self.states.get_mut(element));
-            if let Some(state) = state {
-                state.is_read = false;
+            let counts = usize::try_from(*element).ok().and_then(|element| self.counts.get_mut(element));
+            if let Some(counts) = counts {
+                *counts = f64::NAN;
             }
         }
-        let unwatched = &self.rig.unwatched;
-        let mut is_one = false;
-        for (element, state) in self.states.iter_mut().enumerate().filter(|(_, state)| state.is_read) {
-            state.last_read = Some(at);
-            is_one |= !unwatched.contains(&element);
+        self.last_read.resize(self.counts.len(), None);
+        for (last_read, counts) in self.last_read.iter_mut().zip(&self.counts) {
+            *last_read = if counts.is_nan() { *last_read } else { Some(at) };
         }
+        let is_watched = |element: &usize| !self.rig.unwatched.contains(element);
+        let is_one =
+            self.counts.iter().enumerate().any(|(element, counts)| !counts.is_nan() && is_watched(&element));
         if is_one {
             self.last_frame = Some(at);
         }
@@ -117,7 +111,7 @@ impl Elements {
     pub(crate) fn set_reference(&mut self, counts: &[f64], limits: &Limits) -> Result<(), Violation> {
         let zero = self.checked_zero(counts, limits)?;
         let is_unread = |element: &usize| {
-            zero.get(*element).is_none_or(Option::is_none) && !self.rig.unwatched.contains(element)
+            zero.get(*element).is_none_or(|counts| counts.is_nan()) && !self.rig.unwatched.contains(element)
         };
         if let Some(element) = (0..zero.len().max(1)).find(is_unread) {
             return Err(Violation::Unread { element });
@@ -139,11 +133,9 @@ impl Elements {
     fn checked_zero(&self, counts: &[f64], limits: &Limits) -> Result<Zero, Violation> {
         let zero: Zero = (0..counts.len()).map(|element| self.zero(element, counts, limits)).collect();
         let pairs = zero.iter().zip(&self.rig.baseline_counts).enumerate();
-        for (element, (counts, baseline_counts)) in pairs {
-            if let (Some(counts), Some(baseline_counts)) = (*counts, *baseline_counts)
-                && (counts - baseline_counts).abs() > self.rig.band_counts
-            {
-                let band_counts = self.rig.band_counts;
+        let band_counts = self.rig.band_counts;
+        for (element, (&counts, &baseline_counts)) in pairs {
+            if (counts - baseline_counts).abs() > band_counts {
                 return Err(Violation::Zero { element, counts, baseline_counts, band_counts });
             }
         }
@@ -151,13 +143,13 @@ impl Elements {
     }
 
     /// An element that has been silent for long has no zero.
-    fn zero(&self, element: usize, counts: &[f64], limits: &Limits) -> Option<f64> {
-        let was_read = self.states.get(element).is_none_or(|state| {
-            let silent_s = Limits::silence_s(self.last_frame.unwrap_or_default(), state.last_read);
+    fn zero(&self, element: usize, counts: &[f64], limits: &Limits) -> f64 {
+        let was_read = self.last_read.get(element).is_none_or(|last_read| {
+            let silent_s = Limits::silence_s(self.last_frame.unwrap_or_default(), *last_read);
             silent_s <= limits.silence_max_s()
         });
         let is_watched = was_read && !self.rig.unwatched.contains(&element);
-        counts.get(element).copied().filter(|counts| is_watched && counts.is_finite())
+        counts.get(element).copied().filter(|counts| is_watched && counts.is_finite()).unwrap_or(f64::NAN)
     }
 
     /// Counts silences from `now` at the earliest.
@@ -190,7 +182,7 @@ impl Elements {
         let envelope = &limits.envelope;
         let limit_counts = envelope.element_max_counts + band_counts;
         let mut sum_counts = 0.0;
-        for (element, rise_counts) in self.rises(zero) {
+        for (element, rise_counts) in self.rises(zero).enumerate() {
             if rise_counts > limit_counts {
                 return Some(Violation::ElementForce { element, rise_counts, limit_counts, against });
             }
@@ -205,29 +197,29 @@ impl Elements {
         })
     }
 
-    /// Rises of the elements that were read both now and for the zero.
-    fn rises<'a>(&'a self, zero: &'a Zero) -> impl Iterator<Item = (usize, f64)> + 'a {
-        let pairs = self.states.iter().zip(zero).zip(&self.rig.signs).enumerate();
-        pairs.filter_map(|(element, ((state, zero), sign))| {
-            let zero = zero.filter(|_| state.is_read)?;
-            let rise_counts = state.counts - zero;
-            Some((element, if self.rig.is_signed { rise_counts.abs() } else { rise_counts * sign }))
+    /// Rises by element; NaN for one that was not read both now and for the zero.
+    fn rises<'a>(&'a self, zero: &'a Zero) -> impl Iterator<Item = f64> + 'a {
+        self.counts.iter().zip(zero).zip(&self.rig.signs).map(|((counts, zero), sign)| {
+            let rise_counts = counts - zero;
+            if self.rig.is_signed { rise_counts.abs() } else { rise_counts * sign }
         })
     }
 
     /// Greatest rise above the tare; `None` without a zero.
     pub(crate) fn greatest_rise_counts(&self) -> Option<f64> {
-        let rises = self.rises(self.tare.as_ref()?).map(|(_, rise_counts)| rise_counts);
-        Some(rises.fold(0.0, f64::max))
+        // The greater of a number and NaN is the number.
+        Some(self.rises(self.tare.as_ref()?).fold(0.0, f64::max))
     }
 
     /// An element that has a zero and has not been read for too long: its index and its silence.
     pub(crate) fn silent_element(&self, now: MonoTime, limits: &Limits) -> Option<(usize, f64)> {
-        let zeros = self.reference.as_ref()?.iter();
-        zeros.zip(&self.states).enumerate().find_map(|(element, (zero, state))| {
-            let silent_s = Limits::silence_s(now, state.last_read.max(self.excused));
-            let is_silent = zero.is_some() && !state.is_read && silent_s > limits.silence_max_s();
-            is_silent.then_some((element, silent_s))
-        })
+        let reference = self.reference.as_ref()?;
+        let elements = reference.iter().zip(&self.counts).zip(&self.last_read).enumerate();
+        let unread = elements.filter(|(_, ((zero, counts), _))| !zero.is_nan() && counts.is_nan());
+        unread
+            .map(|(element, (_, last_read))| {
+                (element, Limits::silence_s(now, (*last_read).max(self.excused)))
+            })
+            .find(|(_, silent_s)| *silent_s > limits.silence_max_s())
     }
 }

@@ -9,6 +9,8 @@
 //!
 //! A [`schedule`] is a script of faults made from a seed.
 //!
+//! [`UnwiredRig`] is the same world without bytes, for a dry run.
+//!
 //! Everything random follows from one seed, so that two runs in virtual time are identical to the byte.
 
 pub mod cable;
@@ -29,6 +31,7 @@ mod test_bench;
 mod truth;
 mod truth_file;
 mod twin;
+mod unwired;
 mod wire;
 mod world;
 
@@ -40,3 +43,4 @@ pub use terminal::TerminalPort;
 pub use truth::Truth;
 pub use truth_file::{HIDDEN_SCHEMA, TruthError, TruthFile};
 pub use twin::{simulation_of, twin_of};
+pub use unwired::{UnwiredRig, UnwiredSensor, UnwiredStage};

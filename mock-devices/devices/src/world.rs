@@ -27,6 +27,8 @@ pub(crate) struct World {
     covering: Covering,
     surface_mm: f64,
     deepest_mm: f64,
+    /// False if no element has noise: none is drawn then.
+    is_noisy: bool,
     noise: ChaCha8Rng,
     /// Readings taken so far.
     samplings: u64,
@@ -72,12 +74,21 @@ impl World {
             covering,
             surface_mm: truth.surface_mm,
             deepest_mm: truth.surface_mm - tip_mm[2],
+            is_noisy: truth.noise_rms_counts != 0.0
+                || truth.faults.values().any(|fault| matches!(fault, ElementFault::Noisy { .. })),
             noise: RandomStream::Noise.rng(truth.seed),
             samplings: 0,
             sensor_model,
             trail: None,
             truth,
         }
+    }
+
+    /// Has the tip stand at a place that is known, whatever moves the axes.
+    pub(crate) fn stand_at(&mut self, at_mm: Point) {
+        self.by_axis = None;
+        self.motion = Motion::at_rest(at_mm, at_mm, self.truth.stage.acceleration_mm_per_s2);
+        self.deepest_mm = self.surface_mm - at_mm[2];
     }
 
     /// The truth that the rig hides.
@@ -91,6 +102,17 @@ impl World {
         self.samplings += 1;
         let Self { truth, noise, sensor_model, .. } = self;
         counts.clear();
+        if !self.is_noisy {
+            counts.extend(sensor_model.counts().iter().map(|clean| whole(sensor_model.read(*clean, 0.0))));
+            for (element, fault) in &truth.faults {
+                if let (ElementFault::Stuck { counts: stuck }, Some(count)) =
+                    (fault, counts.get_mut(*element))
+                {
+                    *count = *stuck;
+                }
+            }
+            return;
+        }
         counts.extend(sensor_model.counts().iter().enumerate().map(|(element, clean)| {
             // Drawn for a stuck element too, so that its fault does not change the noise of others.
             let deviate: f64 = StandardNormal.sample(noise);
@@ -99,14 +121,7 @@ impl World {
                 Some(ElementFault::Noisy { noise_rms_counts }) => *noise_rms_counts,
                 Some(ElementFault::Miswired { .. } | ElementFault::Dead) | None => truth.noise_rms_counts,
             };
-            let read = sensor_model.read(*clean, noise_rms_counts * deviate);
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "whole and not negative"
-            )]
-            let count = read.min(f64::from(u16::MAX)) as u16;
-            count
+            whole(sensor_model.read(*clean, noise_rms_counts * deviate))
         }));
     }
 
@@ -234,6 +249,12 @@ pub(crate) fn on_axis(axis: usize, mm: f64) -> Point {
     let mut place = [0.0; 3];
     place[axis] = mm;
     place
+}
+
+/// A converter's output.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and not negative")]
+fn whole(counts: f64) -> u16 {
+    counts.min(f64::from(u16::MAX)) as u16
 }
 
 fn round_to(value: f64, step: f64) -> f64 {

@@ -1,4 +1,4 @@
-//! A rehearsal moves as the run does.
+//! A rehearsal moves as the run does, and a dry run promises what the run does.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,6 +21,9 @@ use tempfile::TempDir;
 
 /// Longest rehearsal here.
 const LONGEST: Duration = Duration::from_mins(30);
+
+/// The embedded stage homes in this time.
+const HOMING_S: f64 = 6.0;
 
 /// Where a row says that the tip was: press and phase, time in ns since the first row, position, covering.
 type Motion = (i32, Phase, i64, [f64; 3], f64);
@@ -120,6 +123,37 @@ fn what_the_rig_cannot_do_and_what_takes_too_long_is_told() {
     let long = script("def run(rig):\n    wait(7200.0)\n");
     let error = rehearsed(request(long, &[], 1), SIMULATED_RIG, LONGEST).unwrap_err();
     assert_eq!(error.to_string(), "the experiment would take more than 30 min");
+}
+
+#[test]
+fn a_dry_run_promises_what_the_run_does() {
+    let grid = &["points=2", "coverings_mm=[1.016,2.54]"][..];
+    for (name, parameters) in [
+        ("element-centres", &[][..]),
+        ("diagnose", &["parts=rates,approach", "scale=0.1"]),
+        ("grid-sweep", grid),
+    ] {
+        let script = experiments::find(name, None).unwrap();
+        let rig = RigFiles::of(SIMULATED_RIG, Path::new("rig.toml")).unwrap();
+        let planned = request(script.clone(), parameters, 7);
+        let order = order::order(planned, &rig.rig, WallTime::default(), &|| false).unwrap();
+        let plan = twin::dry_run(&rig.rig, order, &|| false).unwrap();
+        let ran = request(script, parameters, 7);
+        let folder = TempDir::new().unwrap();
+        let ran = embedded::run(&rig, None, ran, folder.path(), Pace::Virtual, &|| false, |_, _| {}).unwrap();
+        let (plan, ran) = (plan.outcome, ran.outcome);
+        assert_eq!((plan.exit_status, ran.exit_status), (ExitStatus::Done, ExitStatus::Done));
+        assert_eq!(
+            (plan.presses, plan.dwells, plan.travel_mm),
+            (ran.presses, ran.dwells, ran.travel_mm),
+            "{name}"
+        );
+        // The run's stage is homed first. The dry run's tells 20 ms apart when it has arrived, the run's at its controller's pace.
+        println!("{name}: {} s promised, {} s taken", plan.duration_s, ran.duration_s);
+        let late_s = ran.duration_s - plan.duration_s;
+        let tolerance_s = 0.01 * ran.duration_s;
+        assert!((-tolerance_s..HOMING_S + tolerance_s).contains(&late_s), "{name}: {late_s} s late");
+    }
 }
 
 #[test]

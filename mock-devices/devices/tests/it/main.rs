@@ -5,3 +5,4 @@ mod permits;
 mod rig;
 mod schedules;
 mod stages;
+mod unwired;
