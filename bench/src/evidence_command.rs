@@ -200,7 +200,7 @@ impl EvidenceArgs {
     pub(crate) fn run(self) -> Result<()> {
         match self.part {
             Part::Run(args) => args.run(),
-            Part::Score(which) => which.score().map(drop),
+            Part::Score(which) => which.score_all().map(drop),
             Part::Separate(args) => args.run(),
             Part::Constants(which) => which.constants(),
             Part::Contests(which) => which.contests(),
@@ -349,6 +349,19 @@ impl WhichArgs {
         let Some(path) = &self.costs else { return Ok(None) };
         let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
         Ok(Some(serde_json::from_str(&text).with_context(|| path.display().to_string())?))
+    }
+
+    /// Scores sets that have all been run, if they are sealed ones: a part of them says something else.
+    fn score_all(&self) -> Result<Vec<Outcome>> {
+        self.check_seeds()?;
+        let (sets, places) = (self.sets(), self.places());
+        let left = sets.iter().filter(|set| !places.ran(&set.id).exists()).count();
+        ensure!(
+            self.seeds == Seeds::Tuning || left == 0,
+            "{left} of {} sealed sets have not been run: `tactus-bench evidence run` goes on with them",
+            sets.len()
+        );
+        self.score()
     }
 
     fn score(&self) -> Result<Vec<Outcome>> {

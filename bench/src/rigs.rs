@@ -23,6 +23,8 @@ use tactus_runner::embedded::{Truth, simulated_rig};
 use tactus_schema::key::Command;
 use tactus_schema::pb;
 use tactus_virtual::start_devices;
+use tokio::sync::Semaphore;
+use tokio::task::JoinSet;
 use tokio::time::{Instant as TokioInstant, sleep, timeout};
 use zenoh::Session;
 
@@ -32,6 +34,8 @@ use devices::Devices;
 const RATE_HZ: f64 = 30.0;
 /// Only a hang takes this long.
 const PATIENCE: Duration = Duration::from_mins(5);
+/// Runs that are started at the same time: most of it is the homing of the stage.
+const STARTING_MAX: usize = 8;
 /// A run waits for this long for each rig that starts after its own. Its dry run computes every frame of it, and so must not be much longer.
 const START_S: f64 = 0.5;
 
@@ -122,11 +126,7 @@ impl RigsTrial {
         let mut service = self.start(folder)?;
         all_ready(&names, &mut service).await?;
         if self.is_recording {
-            for name in &names {
-                start_run(&service.endpoint, name, &self.script())
-                    .await
-                    .with_context(|| format!("rig {name}"))?;
-            }
+            start_runs(&service.endpoint, &names, &self.script()).await?;
         }
         let (seen, is_counting) =
             (Arc::<Mutex<HashMap<String, Seen>>>::default(), Arc::new(AtomicBool::new(false)));
@@ -273,6 +273,22 @@ async fn all_ready(names: &[String], service: &mut Service) -> Result<()> {
         ensure!(service.child.try_wait()?.is_none(), "the service has ended");
     }
     session.close().await.map_err(|error| anyhow::anyhow!("{error}"))
+}
+
+/// Starts a run on each rig.
+async fn start_runs(endpoint: &Endpoint, names: &[String], script: &str) -> Result<()> {
+    let (room, mut starting) = (Arc::new(Semaphore::new(STARTING_MAX)), JoinSet::new());
+    for name in names.iter().cloned() {
+        let (room, endpoint, script) = (Arc::clone(&room), endpoint.clone(), script.to_owned());
+        starting.spawn(async move {
+            let _place = room.acquire().await?;
+            start_run(&endpoint, &name, &script).await.with_context(|| format!("rig {name}"))
+        });
+    }
+    while let Some(started) = starting.join_next().await {
+        started??;
+    }
+    Ok(())
 }
 
 /// Resets a rig and starts a run on it.

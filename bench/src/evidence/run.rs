@@ -8,10 +8,12 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
+use tactus_sets::Label;
 use tactus_work::{Now, Stop, Work, Worked, Worker, agree, work, write_whole};
 use tempfile::TempDir;
 
 use super::campaign::{Planned, Seeds};
+use super::outcome::parsed;
 use crate::program::{Watched, digest, watched};
 
 /// The folders of a campaign.
@@ -173,7 +175,7 @@ impl Work for Discoveries<'_> {
 
     fn make(&self, set: &Planned, stop: &Stop) -> Result<Option<Discovery>> {
         let made = set.recipe.make().with_context(|| set.id.clone())?;
-        let label = serde_json::to_vec_pretty(&made.label).with_context(|| set.id.clone())?;
+        let label = self.label(set, &made.label)?;
         let now = self.now(set);
         fs::create_dir_all(&now).with_context(|| at(&now))?;
         let folder = TempDir::new_in(&now).with_context(|| at(&now))?;
@@ -231,6 +233,19 @@ impl Work for Discoveries<'_> {
 }
 
 impl Discoveries<'_> {
+    /// The text of a set's label, with the fits of the one that is there if both are of the same set: to fit takes longer than to run.
+    fn label(&self, set: &Planned, label: &Label) -> Result<Vec<u8>> {
+        let text = serde_json::to_vec_pretty(label).with_context(|| set.id.clone())?;
+        let path = self.places.label(&set.id);
+        if !path.exists() {
+            return Ok(text);
+        }
+        // Both as they are read, in which a number may differ in its last bit from what was written.
+        let mut label: Label = serde_json::from_slice(&text).with_context(|| set.id.clone())?;
+        label.adopt_fits(&parsed(&path)?);
+        serde_json::to_vec_pretty(&label).with_context(|| set.id.clone())
+    }
+
     /// Folder of what is in work on a set: each worker has its own in it. The path that the program sees has the seed, not the set's name.
     fn now(&self, set: &Planned) -> PathBuf {
         self.places.work.join("now").join(format!("{:016x}", set.recipe.seed))

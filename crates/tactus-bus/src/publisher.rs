@@ -21,8 +21,8 @@ use crate::{
     topic::{Lane, Policy, encoding, message_name},
 };
 
-/// Period at which each topic's last sequence number is sent, so that a client notices that it missed the last message of
-/// a burst.
+/// Period at which a topic's last sequence number is sent, so that a client notices that it missed the last message of a burst. A topic
+/// that is repeated anyway needs none.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
 /// Room for what a frame has beside its counts; where elements are bad, it may take more.
@@ -133,6 +133,8 @@ impl TopicPublisher {
         let policy = Policy::of(topic);
         let key = keys.topic(topic);
         let encoding = encoding(message_name(topic));
+        let numbered = MissDetectionConfig::default();
+        let detection = if policy.is_repeated { numbered } else { numbered.heartbeat(HEARTBEAT) };
         let publisher = session
             .declare_publisher(key.clone())
             .encoding(encoding.clone())
@@ -140,7 +142,7 @@ impl TopicPublisher {
             .congestion_control(CongestionControl::Drop)
             .reliability(Reliability::Reliable)
             // Numbers messages from 0, as the cache does.
-            .sample_miss_detection(MissDetectionConfig::default().heartbeat(HEARTBEAT))
+            .sample_miss_detection(detection)
             .publisher_detection()
             .await
             .map_err(BusError::key(&key))?;

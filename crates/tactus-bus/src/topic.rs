@@ -42,6 +42,9 @@ pub(crate) struct Policy {
     pub(crate) lane: Lane,
     /// Messages kept for clients that join late or missed some.
     pub(crate) kept: Kept,
+    /// True if the service sends the topic anew every second or more often, whatever happens: who missed a message needs no other sign of
+    /// it than the next.
+    pub(crate) is_repeated: bool,
     /// Each class has its own priority: zenoh holds a lock per client and priority while it waits for room, and history
     /// replies use [`Priority::Data`], so nothing here uses that.
     pub(crate) priority: Priority,
@@ -91,17 +94,18 @@ impl Policy {
     pub(crate) const fn of(topic: Topic) -> Self {
         match topic {
             Topic::SensorFrame => {
-                Self { lane: Lane::Frames, kept: Kept::AsFrames, priority: Priority::DataHigh }
+                let priority = Priority::DataHigh;
+                Self { lane: Lane::Frames, kept: Kept::AsFrames, is_repeated: false, priority }
             }
             Topic::StageState => Self::update(Kept::AsFrames),
             Topic::RunEvent => Self::update(Kept::Last(16_384)),
             Topic::SensorInfo | Topic::SafetyState => Self::update(Kept::Last(256)),
-            Topic::RunState | Topic::Health => Self::update(Kept::Last(1)),
+            Topic::RunState | Topic::Health => Self { is_repeated: true, ..Self::update(Kept::Last(1)) },
         }
     }
 
     const fn update(kept: Kept) -> Self {
-        Self { lane: Lane::Updates, kept, priority: Priority::InteractiveLow }
+        Self { lane: Lane::Updates, kept, is_repeated: false, priority: Priority::InteractiveLow }
     }
 }
 

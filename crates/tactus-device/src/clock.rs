@@ -35,9 +35,9 @@ impl Clock {
     /// The present instant. A real clock reads the system's wall time at each call: a step of the system clock shows
     /// in the wall time and not in the monotonic time.
     pub fn now(&self) -> TimeStamp {
-        let mono = MonoTime::default().after(self.start.elapsed());
-        let wall = if self.is_virtual { self.wall_start.after(self.start.elapsed()) } else { wall_now() };
-        TimeStamp { mono, wall }
+        let elapsed = self.start.elapsed();
+        let wall = if self.is_virtual { self.wall_start.after(elapsed) } else { wall_now() };
+        TimeStamp { mono: MonoTime::default().after(elapsed), wall }
     }
 
     /// The tokio instant of a monotonic time.

@@ -247,7 +247,7 @@ impl Acquisition {
         self.window = self.window.take().and_then(|window| window.take(frame));
         self.watch_clock(frame);
         let clock_offset_s = self.clock.offset_s();
-        self.shared.pulse.send_modify(|pulse| {
+        self.beat(|pulse| {
             *pulse = Pulse {
                 frames: pulse.frames + 1,
                 frames_lost: pulse.frames_lost + u64::from(frame.lost_before),
@@ -309,7 +309,7 @@ impl Acquisition {
         self.stop_for(violation.as_ref());
         self.shared.stage.watch();
         let stage_driven = self.shared.stage.driven();
-        self.shared.pulse.send_modify(|pulse| {
+        self.beat(|pulse| {
             pulse.supervised = now;
             pulse.stage_driven = stage_driven;
         });
@@ -336,6 +336,16 @@ impl Acquisition {
         let Some(violation) = violation else { return };
         error!(%violation, "safety stop");
         self.emit_safety(pb::SafetyVerdict::Stopped, violation.rule(), &violation.to_string());
+    }
+
+    /// Updates the pulse. To wake nobody costs as much as to wake somebody, and there are two of these for each frame. Who begins to
+    /// wait at this moment is woken by the next.
+    fn beat(&self, update: impl FnOnce(&mut Pulse)) {
+        let is_awaited = self.shared.pulse.receiver_count() > 0;
+        self.shared.pulse.send_if_modified(|pulse| {
+            update(pulse);
+            is_awaited
+        });
     }
 
     fn end_run(&self, ending: Ending) {

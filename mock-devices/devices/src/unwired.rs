@@ -144,7 +144,8 @@ impl Sensor for UnwiredSensor {
 
 impl UnwiredSensor {
     fn frame(&mut self) -> Frame {
-        self.world.lock().sample(Instant::now(), &mut self.counts);
+        let received = self.clock.now();
+        self.world.lock().sample(self.clock.instant(received.mono), &mut self.counts);
         let full_scale_counts = self.info.full_scale_counts;
         let is_saturated = self.counts.iter().any(|counts| f64::from(*counts) >= full_scale_counts);
         let flags = [(self.seq == 1, FrameFlags::NEW_EPOCH), (is_saturated, FrameFlags::SATURATED)];
@@ -152,7 +153,7 @@ impl UnwiredSensor {
             seq: self.seq,
             epoch: 1,
             device_tick: None,
-            received: self.clock.now(),
+            received,
             counts: self.counts.iter().map(|counts| f32::from(*counts)).collect(),
             flags: flags
                 .into_iter()
@@ -169,7 +170,8 @@ impl UnwiredSensor {
 impl UnwiredStage {
     /// Tells where it stands or moves now.
     fn report(&self) -> pb::StageState {
-        let (now, stamp) = (Instant::now(), self.clock.now());
+        let stamp = self.clock.now();
+        let now = self.clock.instant(stamp.mono);
         let (is_moving, [x_mm, y_mm, z_mm]) = {
             let mut world = self.world.lock();
             world.settle(now);

@@ -73,8 +73,21 @@ impl PhysicsLabel {
 }
 
 impl Label {
+    /// Takes over the fits of another label if it is of the same set: they follow from all else in it.
+    pub fn adopt_fits(&mut self, earlier: &Self) {
+        let mut bare = earlier.clone();
+        bare.physics.iter_mut().for_each(|dosed| dosed.z_of_effects.clear());
+        if bare == *self {
+            self.clone_from(earlier);
+        }
+    }
+
     /// Names of the library's effects in the set.
     pub fn effects(&self) -> Vec<&str> {
         self.physics.iter().filter_map(|dosed| dosed.effect.as_deref()).collect()
     }
 }
+
+#[cfg(test)]
+#[path = "label_tests.rs"]
+mod tests;
