@@ -1,10 +1,13 @@
 //! An open link to a device: a driver reads, writes and waits for deadlines on it.
 
+use std::io;
 use std::pin::Pin;
 use std::time::Duration;
 
+use futures_util::FutureExt;
 use tactus_schema::{MonoTime, TimeStamp};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::task::yield_now;
 use tokio::time::{Instant, Sleep, sleep_until, timeout};
 
 use crate::transport::ByteStream;
@@ -22,6 +25,8 @@ pub(crate) struct Link {
     buffer: Box<[u8]>,
     /// One for all deadlines: to move it to a later one costs almost nothing, and every frame does.
     timer: Pin<Box<Sleep>>,
+    /// The deadline was reached, and the next event is it, unless it has been moved.
+    is_due: bool,
     clock: Clock,
     device: String,
 }
@@ -37,7 +42,7 @@ pub(crate) enum LinkEvent<'a> {
 impl Link {
     pub(crate) fn new(stream: Box<dyn ByteStream>, clock: Clock, device: String) -> Self {
         let timer = Box::pin(sleep_until(Instant::now()));
-        Self { stream, buffer: vec![0; BUFFER_BYTES].into(), timer, clock, device }
+        Self { stream, buffer: vec![0; BUFFER_BYTES].into(), timer, is_due: false, clock, device }
     }
 
     /// The same link, with room for at least `bytes` in one read: for packets, which come in one piece.
@@ -46,22 +51,29 @@ impl Link {
     }
 
     /// Waits for bytes or the deadline. Cancel-safe.
+    ///
+    /// What has arrived comes before the deadline, although this computer may look at both late: a device is not silent because its host
+    /// was. But only one read does: a device that sends without pause must not delay the deadline.
     pub(crate) async fn next(
         &mut self,
         deadline: Option<Duration>,
     ) -> Result<(TimeStamp, LinkEvent<'_>), DeviceError> {
-        if let Some(deadline) = deadline {
-            let deadline = self.clock.instant(MonoTime::default().after(deadline));
-            if self.timer.deadline() != deadline {
-                self.timer.as_mut().reset(deadline);
-            }
+        let deadline = deadline.map(|deadline| self.clock.instant(MonoTime::default().after(deadline)));
+        if let Some(deadline) = deadline.filter(|deadline| self.timer.deadline() != *deadline) {
+            self.timer.as_mut().reset(deadline);
+            self.is_due = false;
         }
-        let read = tokio::select! {
-            // The deadline comes first: a device that sends without pause must not delay it.
-            biased;
-            () = self.timer.as_mut(), if deadline.is_some() => None,
-            read = self.stream.read(&mut self.buffer) => Some(read),
+        let read = if self.is_due && deadline.is_some() {
+            None
+        } else {
+            tokio::select! {
+                biased;
+                () = self.timer.as_mut(), if deadline.is_some() => self.read_what_has_arrived().await,
+                read = self.stream.read(&mut self.buffer) => Some(read),
+            }
         };
+        // After a read at the deadline.
+        self.is_due = read.is_some() && deadline.is_some_and(|deadline| deadline <= Instant::now());
         let now = self.clock.now();
         match read {
             None => Ok((now, LinkEvent::Deadline)),
@@ -69,6 +81,13 @@ impl Link {
             Some(Ok(count)) => Ok((now, LinkEvent::Received(self.buffer.get(..count).unwrap_or_default()))),
             Some(Err(error)) => Err(DeviceError::disconnected(&self.device, Some(error))),
         }
+    }
+
+    /// A read, if there is something to read.
+    async fn read_what_has_arrived(&mut self) -> Option<io::Result<usize>> {
+        // The runtime looks at what has arrived before it goes on here.
+        yield_now().await;
+        self.stream.read(&mut self.buffer).now_or_never()
     }
 
     /// Writes everything.
@@ -84,3 +103,7 @@ impl Link {
 pub(crate) fn since_start(stamp: TimeStamp) -> Duration {
     stamp.mono.since(MonoTime::default())
 }
+
+#[cfg(test)]
+#[path = "link_tests.rs"]
+mod tests;

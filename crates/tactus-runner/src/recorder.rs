@@ -3,7 +3,7 @@
 //! | thread | does | waits for |
 //! |---|---|---|
 //! | the engine's | queues each message, and checks how old the oldest unwritten one is | nothing |
-//! | recorder | writes the messages, closes a chunk after half a second | the queue, the disk |
+//! | recorder | writes the messages, ten times a second what has come; closes a chunk after half a second | the queue, the disk |
 //! | recorder-sync | makes durable what was written | the recorder's word, every two seconds of the run; the disk |
 //!
 //! A disk that is slow to sync delays only the last of them.
@@ -27,6 +27,9 @@ use life::{Life, Living, Watched};
 
 /// Capacity of the queue to the disk, in messages. The backlog's age fails a run earlier, except at rates beyond 4 kHz.
 const QUEUE: u64 = 4096;
+
+/// Messages are written together after this time: to wake a thread for each would cost as much as to write it. A kill costs as much more.
+const GATHERED: Duration = Duration::from_millis(100);
 
 /// Without messages for this time, the current chunk is closed.
 const IDLE: Duration = Duration::from_millis(250);
@@ -54,6 +57,8 @@ pub struct DirectRecorder(pub Recording);
 #[derive(Debug)]
 pub struct ThreadRecorder {
     entries: Sender<Entry>,
+    /// Sends nothing. Its end says that nothing comes any more, and ends the wait for it.
+    more: Sender<()>,
     backlog: Backlog,
     /// What found the queue full.
     refused: Missing,
@@ -281,11 +286,20 @@ impl ThreadRecorder {
     /// # Errors
     /// As [`ThreadRecorder::start`].
     pub fn start_with<S: Storage + 'static>(recording: Recording<S>, gauge: Gauge) -> std::io::Result<Self> {
+        Self::start_gathering(GATHERED, recording, gauge)
+    }
+
+    fn start_gathering<S: Storage + 'static>(
+        gathered: Duration,
+        recording: Recording<S>,
+        gauge: Gauge,
+    ) -> std::io::Result<Self> {
         gauge.reset();
         let path = recording.path().display().to_string();
         // Overflow policy: never dropped; a full queue is an error that fails the run.
         // Its bound is checked before each message: a bounded channel would take the memory of a full queue at once.
         let (entries, queue) = channel();
+        let (more, end_of_more) = channel();
         // The result of one recording.
         let (end, ended) = sync_channel(1);
         let sync = recording.sync_handle().map_err(std::io::Error::other)?;
@@ -298,15 +312,31 @@ impl ThreadRecorder {
         // From here on the thread has to show that it goes on.
         let living = Living::begin(gauge.clone());
         let recording = recording.map_storage(|storage| Watched::new(storage, gauge.clone()));
-        let writer =
-            Writer { queue, recording, gauge: gauge.clone(), sync_to, wished: None, at: MonoTime::default() };
+        let writer = Writer {
+            queue,
+            gathered,
+            end_of_more,
+            recording,
+            gauge: gauge.clone(),
+            sync_to,
+            wished: None,
+            at: MonoTime::default(),
+        };
         thread::Builder::new().name("recorder".into()).spawn(move || {
             let _living = living;
             let result = writer.write_all();
             // Nobody may wait for the result any more.
             let _told = end.send(result);
         })?;
-        Ok(Self { entries, backlog: Backlog::default(), refused: Missing::default(), gauge, ended, path })
+        Ok(Self {
+            entries,
+            more,
+            backlog: Backlog::default(),
+            refused: Missing::default(),
+            gauge,
+            ended,
+            path,
+        })
     }
 
     /// Checks without a message whether the recorder keeps up: for times in which no message comes.
@@ -337,9 +367,9 @@ impl ThreadRecorder {
     /// # Errors
     /// As [`Record::finish`].
     pub fn finish_within(self, patience: Duration) -> Result<(), RecordFailure> {
-        let Self { entries, mut backlog, refused, gauge, ended, path } = self;
+        let Self { entries, more, mut backlog, refused, gauge, ended, path } = self;
         // The thread ends when the queue does; then everything is on disk.
-        drop(entries);
+        drop((entries, more));
         let result = match ended.recv_timeout(patience) {
             Ok(Ok(())) if refused.messages > 0 => {
                 Err(RecordFailure(Box::new(QueueError::Lossy { path, missing: refused })))
@@ -450,6 +480,9 @@ impl Entry {
 struct Writer<S> {
     /// It goes with the writer, also after a panic: who sees that the thread has ended finds that it takes no message.
     queue: Receiver<Entry>,
+    /// After so long it looks into the queue again.
+    gathered: Duration,
+    end_of_more: Receiver<()>,
     recording: Recording<S>,
     gauge: Gauge,
     sync_to: SyncSender<MonoTime>,
@@ -463,25 +496,46 @@ impl<S: Storage> Writer<S> {
     fn write_all(mut self) -> Result<(), RecordError> {
         loop {
             self.gauge.0.life.beat();
-            let written = match self.queue.recv_timeout(IDLE) {
+            match self.queue.recv_timeout(IDLE) {
                 Ok(entry) => {
-                    let written = self.write(&entry);
-                    self.gauge.show_unstored(self.recording.unstored());
-                    self.gauge.0.written.fetch_add(1, Ordering::Relaxed);
-                    written
+                    self.take(&entry);
+                    self.take_gathered();
+                    // Times out, or ends with the queue.
+                    let _waited = self.end_of_more.recv_timeout(self.gathered);
                 }
-                Err(RecvTimeoutError::Timeout) => self.recording.flush(),
+                Err(RecvTimeoutError::Timeout) => {
+                    let flushed = self.recording.flush();
+                    self.note(flushed);
+                }
                 Err(RecvTimeoutError::Disconnected) => break,
-            };
-            if let Err(failure) = written
-                && self.gauge.failure().is_none()
-            {
-                self.gauge.fail(&failure);
             }
         }
         // The handle for syncs must not outlive the recording by more than the sync in progress.
         drop(self.sync_to);
         self.recording.finish().map(drop)
+    }
+
+    /// Writes what is in the queue.
+    fn take_gathered(&mut self) {
+        while let Ok(entry) = self.queue.try_recv() {
+            self.gauge.0.life.beat();
+            self.take(&entry);
+        }
+    }
+
+    fn take(&mut self, entry: &Entry) {
+        let written = self.write(entry);
+        self.gauge.show_unstored(self.recording.unstored());
+        self.gauge.0.written.fetch_add(1, Ordering::Relaxed);
+        self.note(written);
+    }
+
+    fn note(&self, written: Result<(), RecordError>) {
+        if let Err(failure) = written
+            && self.gauge.failure().is_none()
+        {
+            self.gauge.fail(&failure);
+        }
     }
 
     fn write(&mut self, entry: &Entry) -> Result<(), RecordError> {

@@ -91,11 +91,16 @@ fn hanging(sync: SyncKind) -> (HangingDisk, DiskControl) {
 fn stuck_after_a_chunk(gauge: &Gauge) -> (ThreadRecorder, DiskControl) {
     let (disk, control) = hanging(SyncKind::Works);
     control.permits.send(()).unwrap();
-    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
+    let mut recorder = start(begin(&path(), disk), gauge.clone()).unwrap();
     control.waits.recv().unwrap();
     (0..=16).for_each(|seq| recorder.frame(&frame(seq)).unwrap());
     control.waits.recv().unwrap();
     (recorder, control)
+}
+
+/// A recorder that writes each message at once.
+fn start<S: Storage + 'static>(recording: Recording<S>, gauge: Gauge) -> io::Result<ThreadRecorder> {
+    ThreadRecorder::start_gathering(Duration::ZERO, recording, gauge)
 }
 
 fn begin<S: Storage>(path: &Path, storage: S) -> Recording<S> {
@@ -190,6 +195,23 @@ fn a_disk_that_comes_back_in_time_loses_nothing() {
 }
 
 #[test]
+fn the_end_of_a_run_does_not_wait_for_more_messages() {
+    let (disk, control) = hanging(SyncKind::Works);
+    (0..10).for_each(|_| control.permits.send(()).unwrap());
+    let gauge = Gauge::default();
+    let an_hour = Duration::from_hours(1);
+    let mut recorder = ThreadRecorder::start_gathering(an_hour, begin(&path(), disk), gauge.clone()).unwrap();
+    recorder.frame(&frame(0)).unwrap();
+    while gauge.written() == 0 {
+        std::thread::yield_now();
+    }
+    // The writer waits for more.
+    (1..20).for_each(|seq| recorder.frame(&frame(seq)).unwrap());
+    recorder.finish_within(Duration::from_mins(1)).unwrap();
+    assert_eq!(frames_in(&control), 20);
+}
+
+#[test]
 fn a_silence_of_the_devices_does_not_hide_a_disk_that_hangs() {
     let gauge = Gauge::default();
     let (mut recorder, _control) = stuck_after_a_chunk(&gauge);
@@ -206,7 +228,7 @@ fn a_disk_that_is_slow_to_sync_delays_nothing() {
         control.permits.send(()).unwrap();
     }
     let gauge = Gauge::default();
-    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
+    let mut recorder = start(begin(&path(), disk), gauge.clone()).unwrap();
     // Ten seconds of frames, each once the one before is written.
     for seq in 0..300 {
         recorder.frame(&frame(seq)).unwrap();
@@ -226,7 +248,7 @@ fn a_disk_error_is_the_runs_error_at_the_next_message() {
     let (disk, control) = hanging(SyncKind::Works);
     control.permits.send(()).unwrap();
     let gauge = Gauge::default();
-    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
+    let mut recorder = start(begin(&path(), disk), gauge.clone()).unwrap();
     // The disk fails from now on.
     drop(control);
     let error = (0..).find_map(|seq| {
@@ -272,7 +294,7 @@ impl Storage for PanickingDisk {
 fn a_recorder_that_panics_is_the_runs_error_at_the_next_message() {
     let gauge = Gauge::default();
     let disk = PanickingDisk { has_begun: false };
-    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
+    let mut recorder = start(begin(&path(), disk), gauge.clone()).unwrap();
     // The seventeenth frame closes a chunk.
     (0..=16).for_each(|seq| recorder.frame(&frame(seq)).unwrap());
     assert!(recorder.ended.recv().is_err(), "the thread has ended without a result");
@@ -289,7 +311,7 @@ fn a_folder_deleted_while_a_run_is_recorded_fails_the_run() {
     std::fs::create_dir(path.parent().unwrap()).unwrap();
     let recording = with_header(|header| Recording::create(&path, header)).unwrap();
     let gauge = Gauge::default();
-    let mut recorder = ThreadRecorder::start_with(recording, gauge.clone()).unwrap();
+    let mut recorder = start(recording, gauge.clone()).unwrap();
     recorder.frame(&frame(0)).unwrap();
     std::fs::remove_dir_all(path.parent().unwrap()).unwrap();
     // Within the sync period a message fails.
@@ -319,7 +341,7 @@ fn what_was_recorded_is_made_durable_during_the_run() {
     let path = folder.path().join("recording.mcap");
     let recording = with_header(|header| Recording::create(&path, header)).unwrap();
     let gauge = Gauge::default();
-    let mut recorder = ThreadRecorder::start_with(recording, gauge.clone()).unwrap();
+    let mut recorder = start(recording, gauge.clone()).unwrap();
     for seq in 0..300 {
         recorder.frame(&frame(seq)).unwrap();
         keep_synced(&gauge, seq);
@@ -335,7 +357,7 @@ fn a_disk_that_is_nearly_full_is_an_alarm_before_it_is_full() {
         control.permits.send(()).unwrap();
     }
     let gauge = Gauge::default();
-    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
+    let mut recorder = start(begin(&path(), disk), gauge.clone()).unwrap();
     let alarm = (0..).find_map(|seq| {
         recorder.frame(&frame(seq)).unwrap();
         // The frames' clock waits for the thread that syncs: a slow disk would be another alarm.
