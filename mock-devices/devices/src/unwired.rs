@@ -208,9 +208,10 @@ impl UnwiredStage {
     fn stands(&self) -> Result<Point, StageError> {
         let state = self.report();
         let position_mm = [state.x_mm, state.y_mm, state.z_mm];
-        match state.status() {
-            StageStatus::Idle => Ok(position_mm),
-            _ => Err(StageError::NotIdle { position_mm }),
+        if state.status() == StageStatus::Idle {
+            Ok(position_mm)
+        } else {
+            Err(StageError::NotIdle { position_mm })
         }
     }
 
