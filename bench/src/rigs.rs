@@ -278,8 +278,9 @@ async fn all_ready(names: &[String], service: &mut Service) -> Result<()> {
 /// Starts a run on each rig.
 async fn start_runs(endpoint: &Endpoint, names: &[String], script: &str) -> Result<()> {
     let (room, mut starting) = (Arc::new(Semaphore::new(STARTING_MAX)), JoinSet::new());
-    for name in names.iter().cloned() {
-        let (room, endpoint, script) = (Arc::clone(&room), endpoint.clone(), script.to_owned());
+    for name in names {
+        let (room, endpoint) = (Arc::clone(&room), endpoint.clone());
+        let (name, script) = (name.clone(), script.to_owned());
         starting.spawn(async move {
             let _place = room.acquire().await?;
             start_run(&endpoint, &name, &script).await.with_context(|| format!("rig {name}"))
