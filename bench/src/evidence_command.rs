@@ -200,7 +200,7 @@ impl EvidenceArgs {
     pub(crate) fn run(self) -> Result<()> {
         match self.part {
             Part::Run(args) => args.run(),
-            Part::Score(which) => which.score_all().map(drop),
+            Part::Score(which) => which.score_all(),
             Part::Separate(args) => args.run(),
             Part::Constants(which) => which.constants(),
             Part::Contests(which) => which.contests(),
@@ -352,7 +352,7 @@ impl WhichArgs {
     }
 
     /// Scores sets that have all been run, if they are sealed ones: a part of them says something else.
-    fn score_all(&self) -> Result<Vec<Outcome>> {
+    fn score_all(&self) -> Result<()> {
         self.check_seeds()?;
         let (sets, places) = (self.sets(), self.places());
         let left = sets.iter().filter(|set| !places.ran(&set.id).exists()).count();
@@ -361,7 +361,7 @@ impl WhichArgs {
             "{left} of {} sealed sets have not been run: `tactus-bench evidence run` goes on with them",
             sets.len()
         );
-        self.score()
+        self.score().map(drop)
     }
 
     fn score(&self) -> Result<Vec<Outcome>> {

@@ -72,9 +72,10 @@ impl Link {
                 read = self.stream.read(&mut self.buffer) => Some(read),
             }
         };
-        // After a read at the deadline.
-        self.is_due = read.is_some() && deadline.is_some_and(|deadline| deadline <= Instant::now());
         let now = self.clock.now();
+        // After a read at the deadline.
+        self.is_due =
+            read.is_some() && deadline.is_some_and(|deadline| deadline <= self.clock.instant(now.mono));
         match read {
             None => Ok((now, LinkEvent::Deadline)),
             Some(Ok(0)) => Err(DeviceError::disconnected(&self.device, None)),

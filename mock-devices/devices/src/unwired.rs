@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
-use tactus_device::{Clock, HomingPermit, Permit, Sensor, SensorEvent, Stage, StageError};
+use tactus_device::{ArrayExpectation, Clock, HomingPermit, Permit, Sensor, SensorEvent, Stage, StageError};
 use tactus_schema::pb::StageStatus;
 use tactus_schema::rig::StageProtocol;
 use tactus_schema::{Frame, FrameFlags, MonoTime, Rig, pb};
@@ -108,7 +108,7 @@ impl UnwiredRig {
         let sensor = UnwiredSensor {
             world,
             stage: Arc::clone(&stage),
-            info: describe(rig),
+            info: ArrayExpectation::of(rig).info(0, "none".into(), "simulated, in this process".into()),
             clock,
             started,
             sampling: Box::pin(sleep_until(started)),
@@ -148,17 +148,20 @@ impl UnwiredSensor {
         self.world.lock().sample(self.clock.instant(received.mono), &mut self.counts);
         let full_scale_counts = self.info.full_scale_counts;
         let is_saturated = self.counts.iter().any(|counts| f64::from(*counts) >= full_scale_counts);
-        let flags = [(self.seq == 1, FrameFlags::NEW_EPOCH), (is_saturated, FrameFlags::SATURATED)];
+        let mut flags = FrameFlags::default();
+        if self.seq == 1 {
+            flags = flags.with(FrameFlags::NEW_EPOCH);
+        }
+        if is_saturated {
+            flags = flags.with(FrameFlags::SATURATED);
+        }
         Frame {
             seq: self.seq,
             epoch: 1,
             device_tick: None,
             received,
             counts: self.counts.iter().map(|counts| f32::from(*counts)).collect(),
-            flags: flags
-                .into_iter()
-                .filter(|(is_set, _)| *is_set)
-                .fold(FrameFlags::default(), |flags, (_, flag)| flags.with(flag)),
+            flags,
             lost_before: 0,
             simulated: self.info.simulated,
             bad_elements: Arc::clone(&self.unread),
@@ -311,21 +314,4 @@ fn start_mm(rig: &Rig, travel_mm: [[f64; 2]; 3], has_axis: [bool; 3]) -> Point {
         let [least, greatest] = travel_mm[axis];
         if has_axis[axis] { start_mm[axis].max(least).min(greatest) } else { 0.0 }
     })
-}
-
-fn describe(rig: &Rig) -> pb::SensorInfo {
-    let array = &rig.array;
-    let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-    pb::SensorInfo {
-        rig: rig.name.clone(),
-        array: array.name().to_owned(),
-        rows: count(array.rows()),
-        cols: count(array.cols()),
-        rate_hz: array.rate_hz(),
-        full_scale_counts: array.full_scale_counts(),
-        tick_ns: 0,
-        link: "none".into(),
-        transport: "simulated, in this process".into(),
-        simulated: rig.simulated,
-    }
 }

@@ -100,28 +100,24 @@ impl World {
     pub(crate) fn sample(&mut self, at: Instant, counts: &mut Vec<u16>) {
         self.look(at);
         self.samplings += 1;
-        let Self { truth, noise, sensor_model, .. } = self;
+        let Self { truth, is_noisy, noise, sensor_model, .. } = self;
         counts.clear();
-        if !self.is_noisy {
-            counts.extend(sensor_model.counts().iter().map(|clean| whole(sensor_model.read(*clean, 0.0))));
-            for (element, fault) in &truth.faults {
-                if let (ElementFault::Stuck { counts: stuck }, Some(count)) =
-                    (fault, counts.get_mut(*element))
-                {
-                    *count = *stuck;
-                }
-            }
-            return;
-        }
         counts.extend(sensor_model.counts().iter().enumerate().map(|(element, clean)| {
             // Drawn for a stuck element too, so that its fault does not change the noise of others.
-            let deviate: f64 = StandardNormal.sample(noise);
+            let deviate: f64 = if *is_noisy { StandardNormal.sample(noise) } else { 0.0 };
             let noise_rms_counts = match truth.faults.get(&element) {
                 Some(ElementFault::Stuck { counts }) => return *counts,
                 Some(ElementFault::Noisy { noise_rms_counts }) => *noise_rms_counts,
                 Some(ElementFault::Miswired { .. } | ElementFault::Dead) | None => truth.noise_rms_counts,
             };
-            whole(sensor_model.read(*clean, noise_rms_counts * deviate))
+            let read = sensor_model.read(*clean, noise_rms_counts * deviate);
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "whole and not negative"
+            )]
+            let count = read.min(f64::from(u16::MAX)) as u16;
+            count
         }));
     }
 
@@ -249,12 +245,6 @@ pub(crate) fn on_axis(axis: usize, mm: f64) -> Point {
     let mut place = [0.0; 3];
     place[axis] = mm;
     place
-}
-
-/// A converter's output.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and not negative")]
-fn whole(counts: f64) -> u16 {
-    counts.min(f64::from(u16::MAX)) as u16
 }
 
 fn round_to(value: f64, step: f64) -> f64 {

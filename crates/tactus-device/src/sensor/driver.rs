@@ -6,7 +6,7 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use tactus_schema::{DeviceTick, Frame, FrameFlags, Rig, TimeStamp, pb};
-use tactus_wire::sensor::{Action, Cause, Loss, Reading, Session};
+use tactus_wire::sensor::{Action, Cause, Loss, Reading};
 use tokio::sync::mpsc;
 use tokio::time::sleep;
 use tracing::Instrument as _;
@@ -108,6 +108,23 @@ impl ArrayExpectation {
         }
     }
 
+    /// What the service says of the array, read over a link of this protocol and transport. `tick_ns`: tick of the device's clock, 0 if
+    /// it has none.
+    pub fn info(&self, tick_ns: u64, link: String, transport: String) -> pb::SensorInfo {
+        pb::SensorInfo {
+            rig: self.rig.clone(),
+            array: self.array.clone(),
+            rows: count(self.rows),
+            cols: count(self.cols),
+            rate_hz: self.rate_hz,
+            full_scale_counts: self.full_scale_counts,
+            tick_ns,
+            link,
+            transport,
+            simulated: self.simulated,
+        }
+    }
+
     pub(super) fn elements(&self) -> usize {
         self.rows * self.cols
     }
@@ -182,7 +199,8 @@ impl Driver {
                     }
                     Action::Connected { identity } => {
                         backoff.reset();
-                        let info = self.describe(&*session);
+                        let (tick_ns, link) = (session.tick_ns(), session.name());
+                        let info = self.expect.info(tick_ns, link, self.transport.clone());
                         self.connected(info, identity).await?;
                     }
                     Action::Reading(reading) => {
@@ -226,21 +244,6 @@ impl Driver {
         self.reported_loss = None;
         tracing::info!(device = self.device, identity, "sensor connected");
         self.emit(SensorEvent::Connected(info)).await
-    }
-
-    fn describe(&self, session: &dyn Session) -> pb::SensorInfo {
-        pb::SensorInfo {
-            rig: self.expect.rig.clone(),
-            array: self.expect.array.clone(),
-            rows: count(self.expect.rows),
-            cols: count(self.expect.cols),
-            rate_hz: self.expect.rate_hz,
-            full_scale_counts: self.expect.full_scale_counts,
-            tick_ns: session.tick_ns(),
-            link: session.name(),
-            transport: self.transport.clone(),
-            simulated: self.expect.simulated,
-        }
     }
 
     /// Makes a frame from a reading. `together` counts it and the readings behind it that arrived at the same time.

@@ -8,7 +8,7 @@ use std::time::Duration;
 use tactus_plan::{Arguments, InThisProcess, Script};
 use tactus_record::rows;
 use tactus_runner::config::RigFiles;
-use tactus_runner::embedded::{self, Pace, SIMULATED_RIG};
+use tactus_runner::embedded::{self, Finished, Pace, SIMULATED_RIG};
 use tactus_runner::experiments;
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::rehearsal::{self, Rehearsal};
@@ -54,16 +54,21 @@ fn motion(visit: impl FnOnce(&mut dyn FnMut(RowView<'_>))) -> Vec<Motion> {
     motion
 }
 
+/// Runs it on the embedded rig.
+fn ran(request: RunRequest, rig_toml: &str, folder: &Path) -> Finished {
+    let rig = RigFiles::of(rig_toml, Path::new("rig.toml")).unwrap();
+    let ran = embedded::run(&rig, None, request, folder, Pace::Virtual, &|| false, |_, _| {}).unwrap();
+    assert_eq!(ran.outcome.exit_status, ExitStatus::Done, "{:?}", ran.outcome);
+    ran
+}
+
 /// Rehearses a script, runs it on the embedded rig with the same seed, and compares what both say of the tip, frame by frame.
 fn moves_as_the_run(name: &str, parameters: &[&str], rig_toml: &str) -> Rehearsal {
     let script = experiments::find(name, None).unwrap();
     let rehearsal = rehearsed(request(script.clone(), parameters, 7), rig_toml, LONGEST).unwrap();
     assert_eq!(rehearsal.outcome.exit_status, ExitStatus::Done, "{:?}", rehearsal.outcome);
     let folder = TempDir::new().unwrap();
-    let rig = RigFiles::of(rig_toml, Path::new("rig.toml")).unwrap();
-    let ran = request(script, parameters, 7);
-    let ran = embedded::run(&rig, None, ran, folder.path(), Pace::Virtual, &|| false, |_, _| {}).unwrap();
-    assert_eq!(ran.outcome.exit_status, ExitStatus::Done, "{:?}", ran.outcome);
+    let ran = ran(request(script, parameters, 7), rig_toml, folder.path());
     let predicted = motion(|take| rehearsal.visit(take).unwrap());
     let recorded = motion(|take| drop(rows::visit(&[&ran.recording], |_, row| take(row)).unwrap()));
     assert_eq!(predicted.len(), recorded.len());
@@ -134,15 +139,13 @@ fn a_dry_run_promises_what_the_run_does() {
         ("grid-sweep", grid),
     ] {
         let script = experiments::find(name, None).unwrap();
-        let rig = RigFiles::of(SIMULATED_RIG, Path::new("rig.toml")).unwrap();
+        let rig = Rig::from_toml(SIMULATED_RIG).unwrap();
         let planned = request(script.clone(), parameters, 7);
-        let order = order::order(planned, &rig.rig, WallTime::default(), &|| false).unwrap();
-        let plan = twin::dry_run(&rig.rig, order, &|| false).unwrap();
-        let ran = request(script, parameters, 7);
+        let order = order::order(planned, &rig, WallTime::default(), &|| false).unwrap();
+        let plan = twin::dry_run(&rig, order, &|| false).unwrap().outcome;
+        assert_eq!(plan.exit_status, ExitStatus::Done, "{plan:?}");
         let folder = TempDir::new().unwrap();
-        let ran = embedded::run(&rig, None, ran, folder.path(), Pace::Virtual, &|| false, |_, _| {}).unwrap();
-        let (plan, ran) = (plan.outcome, ran.outcome);
-        assert_eq!((plan.exit_status, ran.exit_status), (ExitStatus::Done, ExitStatus::Done));
+        let ran = ran(request(script, parameters, 7), SIMULATED_RIG, folder.path()).outcome;
         assert_eq!(
             (plan.presses, plan.dwells, plan.travel_mm),
             (ran.presses, ran.dwells, ran.travel_mm),
