@@ -64,6 +64,19 @@ impl Blur {
         overlap_mm2 + rest(greatest, to) - rest(greatest, from) - rest(least, to) + rest(least, from)
     }
 
+    /// The integral of [`Blur::of_point`] over all places up to `at_mm`, in mm, and the integral of that, in mm^2:
+    ///
+    /// `sigma (E((at - least) / sigma) - E((at - greatest) / sigma))`, and the same of `sigma^2 F`; `E` and `F` as of
+    /// [`Blur::of_line`] and [`Blur::moment_of_line`].
+    pub(crate) fn up_to(self, at_mm: f64, [least, greatest]: [f64; 2]) -> [f64; 2] {
+        let [[once, twice], [once_beyond, twice_beyond]] = [least, greatest].map(|edge_mm| {
+            let z = (at_mm - edge_mm) / self.sigma_mm;
+            let (density, below) = (density(z), upper_tail(-z));
+            [z * below + density, ((z * z + 1.0) * below + z * density) / 2.0]
+        });
+        [self.sigma_mm * (once - once_beyond), self.sigma_mm * self.sigma_mm * (twice - twice_beyond)]
+    }
+
     /// Derivatives of [`Blur::of_point`] by the point's place and by `sigma_mm`, in 1/mm.
     pub(crate) fn slope_of_point(self, at_mm: f64, side_mm: [f64; 2]) -> [f64; 2] {
         let [least, greatest] = side_mm.map(|edge_mm| (edge_mm - at_mm) / self.sigma_mm);

@@ -1,8 +1,11 @@
 //! A tool in the covering, cut into slices over which the blur is integrated in closed form.
 
 mod mesh;
+mod outline;
 mod rectangle;
 mod round;
+
+pub(crate) use outline::{Edge, Outline};
 
 use crate::Indenter;
 use crate::quadrature::smooth;
@@ -22,7 +25,7 @@ pub struct Contact {
 }
 
 /// A strip of the penetration map, parallel to y.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Slice {
     /// Position along x.
     pub(crate) x_mm: f64,
@@ -37,16 +40,34 @@ pub(crate) struct Slice {
 /// A line in a plane of constant x: its two ends, each as y and depth below the surface.
 type Line = [[f64; 2]; 2];
 
-/// The function that is cut into slices.
+/// The function that is cut into slices, or integrated along edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Cut {
+pub(crate) enum Cut {
     /// The penetration map `I`.
     Penetration,
     /// Its derivative by depth: 1 where the tool touches, 0 elsewhere.
     Footprint,
 }
 
+/// What a tool presses.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Pressed {
+    /// Its outline: a closed mesh, unless a part of it hides another.
+    Outline(Outline),
+    /// Slices of it: any other tool.
+    Slices(Vec<Slice>),
+}
+
 impl Contact {
+    /// What the tool presses, or the area that it touches. `lean` and accuracy: as of [`Contact::leaning`].
+    pub(crate) fn pressed(&self, cut: Cut, lean: [f64; 2], sigma_mm: f64) -> Pressed {
+        match (self.outline(lean), cut) {
+            (Some(outline), _) => Pressed::Outline(outline),
+            (None, Cut::Penetration) => Pressed::Slices(self.leaning(lean, sigma_mm)),
+            (None, Cut::Footprint) => Pressed::Slices(self.footprint(sigma_mm)),
+        }
+    }
+
     /// Cuts the penetration map into slices so fine that under a blur of `sigma_mm` sums over them agree with the
     /// integrals to about 1e-11 of the volume (a mesh: see its module).
     pub(crate) fn slices(&self, sigma_mm: f64) -> Vec<Slice> {

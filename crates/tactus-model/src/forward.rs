@@ -1,7 +1,7 @@
 //! The base model: from a contact to the counts of every element.
 
 use crate::blur::Blur;
-use crate::contact::Slice;
+use crate::contact::{Cut, Edge, Pressed, Slice};
 use crate::effect::Load;
 use crate::{Array, Contact, Covering, Indenter, Psf};
 
@@ -145,27 +145,61 @@ impl ForwardModel {
         let Load { contact, lean, sigma_mm, .. } = press;
         let finest_mm = sigma_mm[0].min(sigma_mm[1]);
         let blurs = sigma_mm.map(|sigma_mm| Blur { sigma_mm });
-        self.press(&contact.leaning(*lean, finest_mm), blurs, 1.0, shares, indentation_mm);
+        let pressed = contact.pressed(Cut::Penetration, *lean, finest_mm);
+        self.press(&pressed, blurs, 1.0, shares, indentation_mm);
         // The tool cannot go deeper than the covering: min(I, t) = max(0, I) - max(0, I - t).
         if contact.depth_mm > covering.thickness_mm {
             let beyond = Contact { depth_mm: contact.depth_mm - covering.thickness_mm, ..contact.clone() };
-            let slices = beyond.leaning(*lean, finest_mm);
-            self.press(&slices, blurs, -1.0, &mut Shares::default(), indentation_mm);
+            let pressed = beyond.pressed(Cut::Penetration, *lean, finest_mm);
+            self.press(&pressed, blurs, -1.0, &mut Shares::default(), indentation_mm);
         }
     }
 
-    /// Adds what slices give, spread along x and y, times `sign`.
+    /// Adds what is pressed, spread along x and y, times `sign`.
     fn press(
         &self,
-        slices: &[Slice],
+        pressed: &Pressed,
         blurs: [Blur; 2],
         sign: f64,
         shares: &mut Shares,
         indentation_mm: &mut [f64],
     ) {
+        let scale = sign / self.reference_mm2;
+        match pressed {
+            Pressed::Outline(edges) => self.press_edges(edges, blurs, scale, indentation_mm),
+            Pressed::Slices(slices) => self.press_slices(slices, blurs, scale, shares, indentation_mm),
+        }
+    }
+
+    fn press_edges(&self, edges: &[Edge], blurs: [Blur; 2], scale: f64, indentation_mm: &mut [f64]) {
+        let [cols, rows] = self.array.sides_mm();
+        let [along_x, along_y] = blurs;
+        let finest_mm = along_x.sigma_mm.min(along_y.sigma_mm);
+        let mut of_cols = vec![0.0; cols.len()];
+        for node in edges.iter().flat_map(|edge| edge.nodes(Cut::Penetration, finest_mm)) {
+            for (of_col, side_mm) in of_cols.iter_mut().zip(&cols) {
+                let [once_mm, twice_mm2] = along_x.up_to(node.x_mm, *side_mm);
+                *of_col = scale * (node.once * once_mm + node.twice * twice_mm2);
+            }
+            for (row, side_mm) in indentation_mm.chunks_exact_mut(cols.len()).zip(&rows) {
+                let of_row = along_y.of_point(node.y_mm, *side_mm);
+                for (element, of_col) in row.iter_mut().zip(&of_cols) {
+                    *element += of_row * of_col;
+                }
+            }
+        }
+    }
+
+    fn press_slices(
+        &self,
+        slices: &[Slice],
+        blurs: [Blur; 2],
+        scale: f64,
+        shares: &mut Shares,
+        indentation_mm: &mut [f64],
+    ) {
         let [cols, rows] = self.array.sides_mm();
         shares.keep_up(slices, blurs, [&cols, &rows]);
-        let scale = sign / self.reference_mm2;
         let lines_mm = shares.of_rows_mm.chunks_exact(rows.len());
         let mut strips = slices.iter().zip(lines_mm);
         let groups = slices.chunk_by(|one, other| is_same(one.x_mm, other.x_mm));

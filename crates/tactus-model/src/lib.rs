@@ -106,6 +106,7 @@ mod quadrature;
 mod readout;
 mod registration;
 mod simulator;
+mod skin;
 mod trace;
 mod trail;
 mod trajectory;

@@ -1,14 +1,26 @@
 //! The surface of a tool as triangles.
 
+use std::sync::OnceLock;
+
+use crate::skin::Skin;
+
 /// Triangles in the tool's frame: z up, the tool's axis at x = y = 0, in mm.
 ///
 /// Only surfaces that are visible from below make contact, so the mesh need not be closed: through a hole the next surface
 /// above is visible. The order of a triangle's corners does not matter.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Mesh {
     vertices_mm: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,
     bounds_mm: [[f64; 2]; 3],
+    /// Known once it was asked for; `None` if it is none.
+    skin: OnceLock<Option<Skin>>,
+}
+
+impl PartialEq for Mesh {
+    fn eq(&self, other: &Self) -> bool {
+        self.vertices_mm == other.vertices_mm && self.triangles == other.triangles
+    }
 }
 
 /// Why triangles do not make a tool.
@@ -44,7 +56,12 @@ impl Mesh {
         if let Some(vertex) = vertices_mm.iter().position(|vertex| !vertex.iter().all(|c| c.is_finite())) {
             return Err(MeshError::NotFinite { vertex });
         }
-        let mut mesh = Self { vertices_mm: Vec::new(), triangles: Vec::new(), bounds_mm: [[0.0; 2]; 3] };
+        let mut mesh = Self {
+            vertices_mm: Vec::new(),
+            triangles: Vec::new(),
+            bounds_mm: [[0.0; 2]; 3],
+            skin: OnceLock::new(),
+        };
         let mut places = vec![None; vertices_mm.len()];
         let mut seen = false;
         for (triangle, corners) in triangles.iter().enumerate() {
@@ -97,6 +114,11 @@ impl Mesh {
     /// Least and greatest x, y and z.
     pub fn bounds_mm(&self) -> [[f64; 2]; 3] {
         self.bounds_mm
+    }
+
+    /// The mesh as the skin of a solid, if it is one.
+    pub(crate) fn skin(&self) -> Option<&Skin> {
+        self.skin.get_or_init(|| Skin::of(self)).as_ref()
     }
 
     /// The tool with another attitude: every vertex multiplied by `rotation`, row by row.

@@ -1,9 +1,9 @@
 //! A table of presses, sampled once: the fast version of the forward model for one tool under one covering.
 
-mod field;
 mod layers;
 mod products;
 mod sampling;
+mod waves;
 
 use crate::{Contact, Covering, ForwardModel, Indenter};
 use layers::Layers;

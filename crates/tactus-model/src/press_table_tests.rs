@@ -82,6 +82,33 @@ fn it_agrees_with_the_exact_image() {
     }
 }
 
+/// A block that is tilted a little, so that the touched area sweeps over its face within a tenth of a millimetre.
+fn tilted_block() -> Indenter {
+    let corners: Vec<_> = [0.0, 4.0]
+        .iter()
+        .flat_map(|z| [[-3.0, -4.0, *z], [3.0, -4.0, *z], [3.0, 4.0, *z], [-3.0, 4.0, *z]])
+        .collect();
+    let sides = (0..4_u32).flat_map(|k| [[k, (k + 1) % 4, 4 + k], [(k + 1) % 4, 4 + (k + 1) % 4, 4 + k]]);
+    let ends = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+    let block = Mesh::new(&corners, &ends.into_iter().chain(sides).collect::<Vec<_>>()).unwrap();
+    let [(sb, cb), (sc, cc)] = [1.0_f64, 0.5].map(|deg| deg.to_radians().sin_cos());
+    Indenter::Mesh(Arc::new(
+        block.turned([[cb, sb * sc, sb * cc], [0.0, cc, -sc], [-sb, cb * sc, cb * cc]]).unwrap(),
+    ))
+}
+
+#[test]
+fn a_tool_that_is_tilted_a_little_agrees_with_the_exact_image() {
+    for model in [
+        model(Array::digitacts(), Psf::PAPER),
+        one_pitch(Array::fingertip()),
+        one_pitch(Array::tekscan_5027()),
+    ] {
+        let error = error(&model, &tilted_block());
+        assert!(error < 5e-5, "{}: {error:.1e}", model.array().name());
+    }
+}
+
 #[test]
 fn oblong_elements_take_part() {
     let places = |step: f64| (0..6).map(|place| 0.5 + step * f64::from(place)).collect::<Vec<_>>();

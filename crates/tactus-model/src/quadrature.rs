@@ -47,11 +47,6 @@ pub(crate) fn smooth(from: f64, to: f64, sigma_mm: f64) -> impl Iterator<Item = 
     }
 }
 
-/// As [`smooth`], to about 1e-7 with fewer points: 4 over each standard deviation.
-pub(crate) fn coarse(from: f64, to: f64, sigma_mm: f64) -> impl Iterator<Item = (f64, f64)> {
-    panels(&FOUR, from, to, whole((to - from) / sigma_mm))
-}
-
 fn panels(
     nodes: &'static [(f64, f64)],
     from: f64,

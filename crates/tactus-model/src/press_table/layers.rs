@@ -1,17 +1,20 @@
 //! The tables inside a press table, and how they are made.
 
-use super::field::{Field, Grid, spline};
+use super::waves::{Basis, Grid, Waves};
 use super::{reach_mm, single};
-use crate::blur::Blur;
-use crate::quadrature::{coarse, whole};
+use crate::contact::Cut;
+use crate::quadrature::whole;
 use crate::{Contact, Indenter};
 
 /// The tables end at this distance from the tool, in standard deviations of the blur. Beyond it the signal is negligible.
 const TAIL: f64 = 6.0;
 /// Nodes per standard deviation of the blur.
 const NODES_PER_SIGMA: f64 = 6.0;
-/// Even pieces of the depth range. Each depth at which the contact area jumps adds one more.
-const DEPTH_PIECES: u32 = 8;
+/// Pieces of the depth range are halved until their cubics are this close to the signal in their middle, as a share of the signal at the
+/// greatest depth.
+const PIECE_ERROR_MAX: f64 = 4e-5;
+/// Pieces are halved at most this many times.
+const HALVINGS_MAX: u32 = 9;
 
 /// Tables in the tool's frame, one for each piece of the depth range.
 #[derive(Debug, Clone)]
@@ -119,12 +122,13 @@ impl Layers {
         let step_mm = sigma_mm / NODES_PER_SIGMA;
         let half_mm = reach_mm(&press.indenter) + TAIL * sigma_mm + width_mm.hypot(height_mm) / 2.0;
         let steps = whole(half_mm / step_mm);
-        let grid = Grid { origin_mm: [-(steps as f64) * step_mm; 2], step_mm, nodes: [2 * steps + 1; 2] };
-        let maker = Maker { press, sigma_mm, element_mm, turns, grid, reference_mm2 };
+        let grid = Grid { step_mm, steps };
+        let basis = Basis::new(grid, sigma_mm, element_mm, &turns.nodes_rad());
+        let maker = Maker { press, sigma_mm, basis, nodes: grid.nodes(), reference_mm2 };
         Self {
-            origin_mm: grid.origin_mm.map(single),
+            origin_mm: [single(-(steps as f64) * step_mm); 2],
             per_mm: single(1.0 / step_mm),
-            nodes: grid.nodes,
+            nodes: [grid.nodes(); 2],
             turns,
             circle: turns.circle(),
             depth: maker.depth(depth_max_mm),
@@ -141,10 +145,7 @@ pub(super) fn piece_at(pieces: &[Piece], depth_mm: f64) -> &Piece {
 impl Piece {
     /// Weights of the values and slopes at both ends, by cubic Hermite interpolation.
     pub(super) fn weights(&self, depth_mm: f64) -> [f64; 4] {
-        let width_mm = self.to_mm - self.from_mm;
-        let t = (depth_mm - self.from_mm) / width_mm;
-        let u = 1.0 - t;
-        [u * u * (1.0 + 2.0 * t), t * t * (1.0 + 2.0 * u), t * u * u * width_mm, -t * t * u * width_mm]
+        weights(self.from_mm, self.to_mm, depth_mm)
     }
 }
 
@@ -152,92 +153,113 @@ impl Piece {
 struct Maker<'a> {
     press: &'a Contact,
     sigma_mm: f64,
-    element_mm: [f64; 2],
-    turns: Turns,
-    grid: Grid,
+    basis: Basis,
+    /// Of the grid, along each axis.
+    nodes: usize,
     reference_mm2: f64,
-}
-
-/// What a table contains, at a depth in mm.
-#[derive(Clone, Copy)]
-enum Channel {
-    Value(f64),
-    Slope(f64),
 }
 
 /// The spline coefficients of one channel, one table for each rotation.
 type Tables = Vec<Vec<f64>>;
 
+/// The signal at a depth and its slope by depth.
+struct AtDepth {
+    depth_mm: f64,
+    value: Waves,
+    /// Just below this depth.
+    slope: Waves,
+    /// Just above it, where the contact area jumps.
+    slope_above: Option<Waves>,
+}
+
 impl Maker<'_> {
     fn depth(&self, depth_max_mm: f64) -> Depth {
         let Some(jumps_mm) = jumps_mm(&self.press.indenter, depth_max_mm) else {
-            return Depth::Flat(interleave(
-                &[&self.tables(Channel::Slope(depth_max_mm))],
-                self.grid.nodes[0],
-            ));
+            let table = self.tables(&self.waves(Cut::Footprint, depth_max_mm));
+            return Depth::Flat(interleave(&[&table], self.nodes));
         };
-        let even = (0..=DEPTH_PIECES).map(|end| depth_max_mm * f64::from(end) / f64::from(DEPTH_PIECES));
-        let mut ends_mm: Vec<f64> = even.chain(jumps_mm.iter().copied()).collect();
-        ends_mm.sort_by(f64::total_cmp);
         // Two equal ends would give a piece of zero width. Slopes are taken well inside a piece.
         let least_mm = 1e-6 * depth_max_mm;
         let aside_mm = 1e-3 * least_mm;
+        let mut ends_mm: Vec<f64> = [0.0, depth_max_mm].into_iter().chain(jumps_mm).collect();
+        ends_mm.sort_by(f64::total_cmp);
         ends_mm.dedup_by(|after, before| *after - *before < least_mm);
-        let mut pieces = Vec::new();
-        let mut before: Option<(f64, Tables, Tables)> = None;
-        for to_mm in ends_mm {
-            let value = self.tables(Channel::Value(to_mm));
-            let below = self.tables(Channel::Slope(to_mm + aside_mm));
-            let jumps = jumps_mm.iter().any(|jump_mm| (jump_mm - to_mm).abs() < least_mm);
-            let above = if jumps { self.tables(Channel::Slope(to_mm - aside_mm)) } else { below.clone() };
-            if let Some((from_mm, from_value, from_slope)) = before {
-                let table = interleave(&[&from_value, &value, &from_slope, &above], self.grid.nodes[0]);
-                pieces.push(Piece { from_mm, to_mm, table });
-            }
-            before = Some((to_mm, value, below));
-        }
-        Depth::Pieces(pieces)
-    }
-
-    fn tables(&self, channel: Channel) -> Tables {
-        let field = self.field(channel);
-        self.turns.nodes_rad().into_iter().map(|turn_rad| self.integrated(&field, turn_rad)).collect()
-    }
-
-    /// The blurred penetration at a depth, or its derivative by depth, on a grid twice as fine as the table's.
-    fn field(&self, channel: Channel) -> Field {
-        let blur = Blur { sigma_mm: self.sigma_mm };
-        let at = |depth_mm| Contact { depth_mm, ..self.press.clone() };
-        let slices = match channel {
-            Channel::Value(depth_mm) => at(depth_mm).slices(self.sigma_mm),
-            Channel::Slope(depth_mm) => at(depth_mm).footprint(self.sigma_mm),
+        let at = |depth_mm: f64, jumps: bool| AtDepth {
+            depth_mm,
+            value: self.waves(Cut::Penetration, depth_mm),
+            slope: self.waves(Cut::Footprint, depth_mm + aside_mm),
+            slope_above: jumps.then(|| self.waves(Cut::Footprint, depth_mm - aside_mm)),
         };
-        let nodes = self.grid.nodes.map(|nodes| 2 * nodes - 1);
-        Field::of(&slices, blur, Grid { step_mm: self.grid.step_mm / 2.0, nodes, ..self.grid })
+        let mut ends: Vec<AtDepth> = ends_mm.iter().map(|end_mm| at(*end_mm, true)).collect();
+        let most = PIECE_ERROR_MAX * ends.last().map_or(0.0, |deepest| deepest.value.bound());
+        // From the top down, each as often as needed.
+        let mut halved = Vec::new();
+        let mut to_halve: Vec<(AtDepth, u32)> = ends.drain(..).rev().map(|end| (end, 0)).collect();
+        while let Some((from, _)) = to_halve.pop() {
+            while let Some((to, halvings)) = to_halve.last()
+                && *halvings < HALVINGS_MAX
+            {
+                let halvings = halvings + 1;
+                let middle = at(f64::midpoint(from.depth_mm, to.depth_mm), false);
+                let weights = weights(from.depth_mm, to.depth_mm, middle.depth_mm);
+                let above = to.slope_above.as_ref().unwrap_or(&to.slope);
+                let cubic = [&from.value, &to.value, &from.slope, above];
+                let [a, b, c, d] = std::array::from_fn(|channel| (cubic[channel], weights[channel]));
+                if Waves::sum([(&middle.value, 1.0), minus(a), minus(b), minus(c), minus(d)]).bound() <= most
+                {
+                    break;
+                }
+                if let Some((_, halvings_of_rest)) = to_halve.last_mut() {
+                    *halvings_of_rest = halvings;
+                }
+                to_halve.push((middle, halvings));
+            }
+            halved.push(from);
+        }
+        Depth::Pieces(self.pieces(&halved))
     }
 
-    /// Integrates a field at every node over an element turned by `turn_rad`. The result is in units of the reference
-    /// press, as spline coefficients.
-    fn integrated(&self, field: &Field, turn_rad: f64) -> Vec<f64> {
-        let (sin, cos) = turn_rad.sin_cos();
-        let along = |side: f64| coarse(-side / 2.0, side / 2.0, self.sigma_mm).collect::<Vec<_>>();
-        let [along_x, along_y] = self.element_mm.map(along);
-        let mut points = Vec::with_capacity(along_x.len() * along_y.len());
-        for (x, width) in &along_x {
-            for (y, height) in &along_y {
-                points.push(([cos * x + sin * y, cos * y - sin * x], width * height / self.reference_mm2));
+    /// Pieces between depths.
+    fn pieces(&self, ends: &[AtDepth]) -> Vec<Piece> {
+        let mut before: Option<(f64, Tables, Tables)> = None;
+        let mut pieces = Vec::with_capacity(ends.len());
+        for AtDepth { depth_mm: to_mm, value, slope, slope_above } in ends {
+            let (value, below) = (self.tables(value), self.tables(slope));
+            if let Some((from_mm, from_value, from_slope)) = before {
+                let above = slope_above.as_ref().map(|slope| self.tables(slope));
+                let above = above.as_ref().unwrap_or(&below);
+                let table = interleave(&[&from_value, &value, &from_slope, above], self.nodes);
+                pieces.push(Piece { from_mm, to_mm: *to_mm, table });
             }
+            before = Some((*to_mm, value, below));
         }
-        let [columns, rows] = self.grid.places_mm();
-        let mut values = Vec::with_capacity(columns.len() * rows.len());
-        for y in &rows {
-            for x in &columns {
-                values
-                    .push(points.iter().map(|([dx, dy], weight)| weight * field.at([x + dx, y + dy])).sum());
-            }
-        }
-        spline(values, self.grid.nodes)
+        pieces
     }
+
+    /// In units of the reference press.
+    fn tables(&self, field: &Waves) -> Tables {
+        let mut tables = self.basis.tables(field);
+        tables.iter_mut().flatten().for_each(|value| *value /= self.reference_mm2);
+        tables
+    }
+
+    /// The blurred penetration at a depth, or its derivative by depth.
+    fn waves(&self, cut: Cut, depth_mm: f64) -> Waves {
+        let contact = Contact { depth_mm, ..self.press.clone() };
+        self.basis.waves(&contact.pressed(cut, [0.0; 2], self.sigma_mm), cut)
+    }
+}
+
+fn minus((field, weight): (&Waves, f64)) -> (&Waves, f64) {
+    (field, -weight)
+}
+
+/// Weights of the values and slopes at both ends, by cubic Hermite interpolation.
+fn weights(from_mm: f64, to_mm: f64, depth_mm: f64) -> [f64; 4] {
+    let width_mm = to_mm - from_mm;
+    let t = (depth_mm - from_mm) / width_mm;
+    let u = 1.0 - t;
+    [u * u * (1.0 + 2.0 * t), t * t * (1.0 + 2.0 * u), t * u * u * width_mm, -t * t * u * width_mm]
 }
 
 /// Puts several channels into one table, ordered by node, then by rotation, then by channel. A row of zeros is added, so
