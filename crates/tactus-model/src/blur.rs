@@ -77,6 +77,19 @@ impl Blur {
         [self.sigma_mm * (once - once_beyond), self.sigma_mm * self.sigma_mm * (twice - twice_beyond)]
     }
 
+    /// [`Blur::of_point`] and its first four derivatives by the point's place.
+    pub(crate) fn slopes_of_point(self, at_mm: f64, side_mm: [f64; 2]) -> [f64; 5] {
+        let [from, to] = side_mm.map(|edge_mm| {
+            let z = (at_mm - edge_mm) / self.sigma_mm;
+            [1.0, -z, z * z - 1.0, (3.0 - z * z) * z].map(|part| part * density(z))
+        });
+        let slope = |order: i32| {
+            let place = usize::try_from(order - 1).unwrap_or(0);
+            (from[place] - to[place]) * self.sigma_mm.powi(-order)
+        };
+        [self.of_point(at_mm, side_mm), slope(1), slope(2), slope(3), slope(4)]
+    }
+
     /// Derivatives of [`Blur::of_point`] by the point's place and by `sigma_mm`, in 1/mm.
     pub(crate) fn slope_of_point(self, at_mm: f64, side_mm: [f64; 2]) -> [f64; 2] {
         let [least, greatest] = side_mm.map(|edge_mm| (edge_mm - at_mm) / self.sigma_mm);

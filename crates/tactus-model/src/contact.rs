@@ -5,7 +5,7 @@ mod outline;
 mod rectangle;
 mod round;
 
-pub(crate) use outline::{Edge, Outline};
+pub(crate) use outline::{Edge, Node, Outline, Outliner};
 
 use crate::Indenter;
 use crate::quadrature::smooth;

@@ -1,7 +1,7 @@
 //! The base model: from a contact to the counts of every element.
 
 use crate::blur::Blur;
-use crate::contact::{Cut, Edge, Pressed, Slice};
+use crate::contact::{Cut, Edge, Node, Pressed, Slice};
 use crate::effect::Load;
 use crate::{Array, Contact, Covering, Indenter, Psf};
 
@@ -166,25 +166,34 @@ impl ForwardModel {
     ) {
         let scale = sign / self.reference_mm2;
         match pressed {
-            Pressed::Outline(edges) => self.press_edges(edges, blurs, scale, indentation_mm),
+            Pressed::Outline(edges) => self.press_edges(edges, blurs, scale, shares, indentation_mm),
             Pressed::Slices(slices) => self.press_slices(slices, blurs, scale, shares, indentation_mm),
         }
     }
 
-    fn press_edges(&self, edges: &[Edge], blurs: [Blur; 2], scale: f64, indentation_mm: &mut [f64]) {
+    fn press_edges(
+        &self,
+        edges: &[Edge],
+        blurs: [Blur; 2],
+        scale: f64,
+        shares: &mut Shares,
+        indentation_mm: &mut [f64],
+    ) {
         let [cols, rows] = self.array.sides_mm();
-        let [along_x, along_y] = blurs;
-        let finest_mm = along_x.sigma_mm.min(along_y.sigma_mm);
-        let mut of_cols = vec![0.0; cols.len()];
-        for node in edges.iter().flat_map(|edge| edge.nodes(Cut::Penetration, finest_mm)) {
-            for (of_col, side_mm) in of_cols.iter_mut().zip(&cols) {
-                let [once_mm, twice_mm2] = along_x.up_to(node.x_mm, *side_mm);
-                *of_col = scale * (node.once * once_mm + node.twice * twice_mm2);
+        let finest_mm = blurs[0].sigma_mm.min(blurs[1].sigma_mm);
+        let nodes: Vec<Node> =
+            edges.iter().flat_map(|edge| edge.nodes(Cut::Penetration, finest_mm)).collect();
+        shares.keep_up_nodes(&nodes, blurs, [&cols, &rows]);
+        let of_cols = shares.up_to_cols.chunks_exact(cols.len());
+        let of_rows = shares.of_rows_mm.chunks_exact(rows.len());
+        let mut of_node = vec![0.0; cols.len()];
+        for ((Node { once, twice, .. }, of_cols), of_rows) in nodes.iter().zip(of_cols).zip(of_rows) {
+            for (of_node, [once_mm, twice_mm2]) in of_node.iter_mut().zip(of_cols) {
+                *of_node = scale * (once * once_mm + twice * twice_mm2);
             }
-            for (row, side_mm) in indentation_mm.chunks_exact_mut(cols.len()).zip(&rows) {
-                let of_row = along_y.of_point(node.y_mm, *side_mm);
-                for (element, of_col) in row.iter_mut().zip(&of_cols) {
-                    *element += of_row * of_col;
+            for (row, of_row) in indentation_mm.chunks_exact_mut(cols.len()).zip(of_rows) {
+                for (element, of_node) in row.iter_mut().zip(&of_node) {
+                    *element += of_row * of_node;
                 }
             }
         }
@@ -282,28 +291,64 @@ impl Response {
     }
 }
 
-/// What the sides of an array get of slices by their places alone, whatever their weights.
+/// What the sides of an array get of slices, or of points of an outline, by their places alone, whatever their weights.
 #[derive(Debug, Default)]
 pub(crate) struct Shares {
     /// Spread along x and y.
     sigma_mm: [f64; 2],
-    /// Of each slice: position along x, least and greatest y.
+    /// Of each slice: position along x, least and greatest y. Of each point: x and twice its y.
     places_mm: Vec<[f64; 3]>,
     /// For each x among the slices: the share of each column.
     of_cols: Vec<f64>,
-    /// For each slice: its length along each row.
+    /// For each point: what is up to it of each column, as of [`Blur::up_to`].
+    up_to_cols: Vec<[f64; 2]>,
+    /// For each slice its length along each row, for each point its share.
     of_rows_mm: Vec<f64>,
 }
 
 impl Shares {
-    /// Computes them, unless they are of the same places under the same spread. The array is always the same.
-    fn keep_up(&mut self, slices: &[Slice], blurs: [Blur; 2], [cols, rows]: [&[[f64; 2]]; 2]) {
-        let sigma_mm = blurs.map(|blur| blur.sigma_mm);
-        let places_mm = slices.iter().map(|Slice { x_mm, y_mm: [from, to], .. }| [*x_mm, *from, *to]);
-        let is_known = self.places_mm.len() == slices.len()
+    /// Whether these places were the last ones, under the same spread. If not, from now on they are.
+    fn knows(
+        &mut self,
+        places_mm: impl ExactSizeIterator<Item = [f64; 3]> + Clone,
+        sigma_mm: [f64; 2],
+    ) -> bool {
+        let is_known = self.places_mm.len() == places_mm.len()
             && self.places_mm.iter().zip(places_mm.clone()).all(|(known, place)| are_same(*known, place))
             && are_same(self.sigma_mm, sigma_mm);
-        if is_known {
+        if !is_known {
+            self.sigma_mm = sigma_mm;
+            self.places_mm.clear();
+            self.places_mm.extend(places_mm);
+        }
+        is_known
+    }
+
+    /// As [`Shares::keep_up`], for points of an outline.
+    fn keep_up_nodes(&mut self, nodes: &[Node], blurs: [Blur; 2], [cols, rows]: [&[[f64; 2]]; 2]) {
+        let places_mm = nodes.iter().map(|node| [node.x_mm, node.y_mm, node.y_mm]);
+        if self.knows(places_mm, blurs.map(|blur| blur.sigma_mm)) {
+            return;
+        }
+        let [along_x, along_y] = blurs;
+        let of_x = |node: &Node| {
+            let x_mm = node.x_mm;
+            cols.iter().map(move |side_mm| along_x.up_to(x_mm, *side_mm))
+        };
+        let of_y = |node: &Node| {
+            let y_mm = node.y_mm;
+            rows.iter().map(move |side_mm| along_y.of_point(y_mm, *side_mm))
+        };
+        self.up_to_cols.clear();
+        self.up_to_cols.extend(nodes.iter().flat_map(of_x));
+        self.of_rows_mm.clear();
+        self.of_rows_mm.extend(nodes.iter().flat_map(of_y));
+    }
+
+    /// Computes them, unless they are of the same places under the same spread. The array is always the same.
+    fn keep_up(&mut self, slices: &[Slice], blurs: [Blur; 2], [cols, rows]: [&[[f64; 2]]; 2]) {
+        let places_mm = slices.iter().map(|Slice { x_mm, y_mm: [from, to], .. }| [*x_mm, *from, *to]);
+        if self.knows(places_mm, blurs.map(|blur| blur.sigma_mm)) {
             return;
         }
         let [along_x, along_y] = blurs;
@@ -311,9 +356,6 @@ impl Shares {
             slices.chunk_by(|one, other| is_same(one.x_mm, other.x_mm)).map(|of_one_x| of_one_x[0].x_mm);
         let of_x = |x_mm: f64| cols.iter().map(move |side_mm| along_x.of_point(x_mm, *side_mm));
         let of_y = |y_mm: [f64; 2]| rows.iter().map(move |side_mm| along_y.of_line(y_mm, *side_mm));
-        self.sigma_mm = sigma_mm;
-        self.places_mm.clear();
-        self.places_mm.extend(places_mm);
         self.of_cols.clear();
         self.of_cols.extend(xs_mm.flat_map(of_x));
         self.of_rows_mm.clear();

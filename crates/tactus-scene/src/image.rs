@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use tactus_model::{Covering, ForwardModel, Mesh};
+use tactus_model::{Covering, ForwardModel, Mesh, MeshImages};
 
 use crate::Pose;
 use crate::depth::{self, DepthMap};
@@ -51,7 +51,12 @@ pub enum RenderError {
 /// `A` is the length of a cell that arrives in a column (or row) of elements after the blur. The viewing volume is the
 /// covering. The tool can have any attitude. The mesh need not be closed, and the order of corners does not matter.
 ///
-/// # Accuracy
+/// The images of a closed mesh need no raster: they follow from the edges at which the depth ends or bends ([`MeshImages`]), thirty times
+/// as fast and within 3e-4 of the peak. [`Renderer::image`] makes them so where it can, and by the raster otherwise: where the mesh is
+/// open, where it passes through itself, and where much of it is hidden below the surface. [`Renderer::raster_images`] always uses the
+/// raster, as the GPU does.
+///
+/// # Accuracy of the raster
 ///
 /// The edges of the tool are resolved by 16 samples per cell, so the error depends on the number of cells that the
 /// tool touches. Compared with [`ForwardModel::image`], which has no raster, no element differs by more than
@@ -80,11 +85,14 @@ pub struct Renderer {
     pub(crate) mesh: Arc<Mesh>,
     pub(crate) lattice: Lattice,
     foot_mm: f64,
+    /// For a closed mesh.
+    outlines: Option<MeshImages>,
 }
 
 /// Memory that a thread reuses from pose to pose.
 #[derive(Default)]
 struct Buffers {
+    outlines: Option<MeshImages>,
     placed: Placed,
     facets: Vec<Facet>,
     samples_mm: Vec<[f32; SAMPLES]>,
@@ -125,7 +133,8 @@ impl Renderer {
             }
         }
         let lattice = Lattice::new(model.array(), sigma_mm, cell_mm)?;
-        Ok(Self { model, mesh, lattice, foot_mm: covering.thickness_mm })
+        let outlines = MeshImages::new(&model, Arc::clone(&mesh), covering);
+        Ok(Self { model, mesh, lattice, foot_mm: covering.thickness_mm, outlines })
     }
 
     /// The model whose counts the images hold.
@@ -157,7 +166,7 @@ impl Renderer {
     pub fn image(&self, pose: &Pose, counts: &mut [f32]) -> Result<(), RenderError> {
         let poses = std::slice::from_ref(pose);
         self.check(poses, counts)?;
-        self.render(&mut Buffers::default(), pose, counts);
+        self.render(&mut self.buffers(), pose, counts);
         Ok(())
     }
 
@@ -169,13 +178,34 @@ impl Renderer {
     /// # Errors
     /// As of [`Renderer::image`].
     pub fn images(&self, poses: &[Pose], counts: &mut [f32]) -> Result<(), RenderError> {
+        self.images_with(|| self.buffers(), poses, counts)
+    }
+
+    /// As [`Renderer::images`], always by the raster.
+    ///
+    /// # Errors
+    /// As of [`Renderer::image`].
+    pub fn raster_images(&self, poses: &[Pose], counts: &mut [f32]) -> Result<(), RenderError> {
+        self.images_with(Buffers::default, poses, counts)
+    }
+
+    fn images_with(
+        &self,
+        buffers: impl Fn() -> Buffers + Sync + Send,
+        poses: &[Pose],
+        counts: &mut [f32],
+    ) -> Result<(), RenderError> {
         self.check(poses, counts)?;
         let elements = self.model.array().elements();
         poses
             .par_iter()
             .zip(counts.par_chunks_exact_mut(elements))
-            .for_each_init(Buffers::default, |buffers, (pose, counts)| self.render(buffers, pose, counts));
+            .for_each_init(buffers, |buffers, (pose, counts)| self.render(buffers, pose, counts));
         Ok(())
+    }
+
+    fn buffers(&self) -> Buffers {
+        Buffers { outlines: self.outlines.clone(), ..Buffers::default() }
     }
 
     pub(crate) fn check(&self, poses: &[Pose], counts: &[f32]) -> Result<(), RenderError> {
@@ -200,7 +230,13 @@ impl Renderer {
 
     /// Image of a pose that was checked.
     fn render(&self, buffers: &mut Buffers, pose: &Pose, counts: &mut [f32]) {
-        let Buffers { placed, facets, samples_mm, depths_mm } = buffers;
+        let Buffers { outlines, placed, facets, samples_mm, depths_mm } = buffers;
+        let Pose { position_mm, attitude, depth_mm } = *pose;
+        if let Some(outlines) = outlines
+            && outlines.image(position_mm, attitude.matrix(), depth_mm, counts)
+        {
+            return;
+        }
         let window = self.facets(pose, placed, facets);
         depth::draw(window, facets, samples_mm, depths_mm);
         self.integrate(window, depths_mm, counts);

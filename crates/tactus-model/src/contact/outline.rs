@@ -108,53 +108,68 @@ impl Contact {
         let (sin, cos) = rotation_deg.to_radians().sin_cos();
         let [_, _, [lowest, _]] = mesh.bounds_mm();
         let upright_mm = depth_mm - indenter.lowered_mm(lean);
-        let place = |[u, v, w]: &[f64; 3]| {
+        let mut outliner = Outliner::default();
+        outliner.placed.extend(skin.points_mm.iter().map(|[u, v, w]| {
             let below_mm = upright_mm - (w - lowest) + lean[0] * u + lean[1] * v;
             [x + cos * u - sin * v, y + sin * u + cos * v, below_mm]
-        };
-        let placed: Vec<_> = skin.points_mm.iter().map(place).collect();
-        outline(skin, &placed)
+        }));
+        outliner.outline(skin)?;
+        Some(outliner.edges)
     }
 }
 
-/// The outline of a skin whose points are placed: x, y and depth below the surface.
-fn outline(skin: &Skin, placed: &[[f64; 3]]) -> Option<Outline> {
-    let corners = |triangle: &[u32; 3]| triangle.map(|corner| placed[corner as usize]);
-    let faces: Vec<Face> = skin.triangles.iter().map(|triangle| face(corners(triangle))).collect();
-    let mut edges = Vec::new();
-    for Seam { ends, beside } in &skin.seams {
-        // Seen from above, a triangle that faces downwards lies at the right of its edges.
-        let [right, left] = beside.map(|triangle| faces[triangle as usize]);
-        let [from, to] = ends.map(|end| placed[end as usize]);
-        let (ends_mm, rim, bend) = match (left, right) {
-            (Face::Seen(left), Face::Seen(right)) => ([from, to], 0.0, left - right),
-            (Face::Seen(left), Face::Aside | Face::Back) => ([from, to], 1.0, left),
-            (Face::Aside | Face::Back, Face::Seen(right)) => ([to, from], 1.0, right),
-            (Face::Aside | Face::Back, Face::Aside | Face::Back) => continue,
-        };
-        if (rim != 0.0 || bend.abs() > SAME_BEND)
-            && let Some(ends_mm) = part_below(ends_mm)
-        {
-            edges.push(Edge { ends_mm, rim, bend });
+/// Finds outlines, and keeps its memory from one to the next.
+#[derive(Debug, Default)]
+pub(crate) struct Outliner {
+    /// The points of the skin: x, y and depth below the surface, sensor frame.
+    pub(crate) placed: Vec<[f64; 3]>,
+    faces: Vec<Face>,
+    /// The outline that was found last.
+    pub(crate) edges: Outline,
+}
+
+impl Outliner {
+    /// Finds the outline of a skin whose points are placed. `None` if too much is hidden.
+    pub(crate) fn outline(&mut self, skin: &Skin) -> Option<()> {
+        let Self { placed, faces, edges } = self;
+        let corners = |triangle: &[u32; 3]| triangle.map(|corner| placed[corner as usize]);
+        faces.clear();
+        faces.extend(skin.triangles.iter().map(|triangle| face(corners(triangle))));
+        edges.clear();
+        for Seam { ends, beside } in &skin.seams {
+            // Seen from above, a triangle that faces downwards lies at the right of its edges.
+            let [right, left] = beside.map(|triangle| faces[triangle as usize]);
+            let [from, to] = ends.map(|end| placed[end as usize]);
+            let (ends_mm, rim, bend) = match (left, right) {
+                (Face::Seen(left), Face::Seen(right)) => ([from, to], 0.0, left - right),
+                (Face::Seen(left), Face::Aside | Face::Back) => ([from, to], 1.0, left),
+                (Face::Aside | Face::Back, Face::Seen(right)) => ([to, from], 1.0, right),
+                (Face::Aside | Face::Back, Face::Aside | Face::Back) => continue,
+            };
+            if (rim != 0.0 || bend.abs() > SAME_BEND)
+                && let Some(ends_mm) = part_below(ends_mm)
+            {
+                edges.push(Edge { ends_mm, rim, bend });
+            }
         }
-    }
-    // Where the surface cuts through a face.
-    for (triangle, face) in skin.triangles.iter().zip(&faces) {
-        if let Face::Seen(bend) = face
-            && let Some(ends_mm) = waterline(corners(triangle))
-        {
-            edges.push(Edge { ends_mm, rim: 1.0, bend: *bend });
+        // Where the surface cuts through a face.
+        for (triangle, face) in skin.triangles.iter().zip(&*faces) {
+            if let Face::Seen(bend) = face
+                && let Some(ends_mm) = waterline(corners(triangle))
+            {
+                edges.push(Edge { ends_mm, rim: 1.0, bend: *bend });
+            }
         }
+        if faces.contains(&Face::Back) {
+            let parts = |of: fn(&Face) -> bool| {
+                let those = skin.triangles.iter().zip(&*faces).filter(move |(_, face)| of(face));
+                those.map(|(triangle, _)| below_surface(corners(triangle))).collect::<Vec<_>>()
+            };
+            let backs = parts(|face| *face == Face::Back);
+            take_off_hidden(&backs, &parts(|face| matches!(face, Face::Seen(_))), edges)?;
+        }
+        Some(())
     }
-    let parts = |of: fn(&Face) -> bool| {
-        let those = skin.triangles.iter().zip(&faces).filter(move |(_, face)| of(face));
-        those.map(|(triangle, _)| below_surface(corners(triangle))).collect::<Vec<_>>()
-    };
-    let backs = parts(|face| *face == Face::Back);
-    if !backs.is_empty() {
-        take_off_hidden(&backs, &parts(|face| matches!(face, Face::Seen(_))), &mut edges)?;
-    }
-    Some(edges)
 }
 
 fn face([a, b, c]: [[f64; 3]; 3]) -> Face {

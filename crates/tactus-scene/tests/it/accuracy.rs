@@ -43,7 +43,7 @@ fn exact(
 /// Greatest difference of a pose's image from the exact one, relative to its peak.
 fn error(renderer: &Renderer, pose: &Pose, exact: &[f64]) -> f64 {
     let mut counts = vec![0.0; exact.len()];
-    renderer.image(pose, &mut counts).unwrap();
+    renderer.raster_images(std::slice::from_ref(pose), &mut counts).unwrap();
     let peak = exact.iter().copied().fold(0.0, f64::max);
     exact.iter().zip(&counts).map(|(exact, count)| (exact - f64::from(*count)).abs()).fold(0.0, f64::max)
         / peak

@@ -60,7 +60,7 @@ fn shaders_and_processor_make_the_same_images() {
             let elements = array.elements();
             let poses = poses(&array);
             let mut expected = vec![0.0; poses.len() * elements];
-            renderer.images(&poses, &mut expected).unwrap();
+            renderer.raster_images(&poses, &mut expected).unwrap();
             let mut gpu = GpuRenderer::new(renderer).unwrap();
             let mut counts = vec![0.0; expected.len()];
             gpu.images(&poses, &mut counts).unwrap();

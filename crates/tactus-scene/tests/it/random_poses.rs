@@ -1,4 +1,4 @@
-//! The rendered image against the exact one over random poses of every made tool and of round ones.
+//! The image by the raster and that along outlines against the exact one over random poses of every made tool and of round ones.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::f64::consts::{PI, TAU};
@@ -27,6 +27,9 @@ const POSES: [(Tool, [usize; 3]); 7] = [
 /// three are tilted, and most of those touch with an edge or a corner only.
 const SHARE_OVER_MAX: [(usize, f64); 4] = [(0, 1.0), (10, 1.0), (100, 0.25), (1000, 0.03)];
 
+/// Of a pose whose image is made along its outline.
+const OUTLINE_ERROR_MAX: f64 = 1e-3;
+
 #[derive(Debug, Clone, Copy)]
 enum Tool {
     Scene(Scene),
@@ -46,8 +49,10 @@ struct Case {
 }
 
 struct Found {
-    /// Greatest difference of an element, relative to the image's peak.
+    /// Greatest difference of an element of the rastered image, relative to the image's peak.
     error: f64,
+    /// The same of the image along outlines, where it is made so.
+    outline_error: f64,
     /// What [`Renderer`] states for this pose.
     bound: f64,
     /// Cells that the tool touches.
@@ -67,6 +72,12 @@ fn random_poses_agree_with_the_exact_image_within_the_stated_bound() {
     println!("{} poses, at most {most:.2} of the bound", all.len());
     for Found { error, bound, label, .. } in &all {
         assert!(error <= bound, "{error:e} exceeds {bound:e}: {label}");
+    }
+    let outlined = all.iter().filter(|found| found.outline_error > 0.0);
+    println!("{} poses by their outline", outlined.clone().count());
+    assert!(2 * outlined.clone().count() > all.len(), "most tools are closed");
+    for Found { outline_error, label, .. } in outlined {
+        assert!(*outline_error < OUTLINE_ERROR_MAX, "{outline_error:e} by its outline: {label}");
     }
     for (index, (least, share_over_max)) in SHARE_OVER_MAX.into_iter().enumerate() {
         let end = SHARE_OVER_MAX.get(index + 1).map_or(usize::MAX, |(next, _)| *next);
@@ -129,16 +140,24 @@ impl Case {
         let contact = Contact { indenter, position_mm, rotation_deg: 0.0, depth_mm };
         model.image(&contact, *covering, &mut exact);
         let mut rendered = vec![0.0; exact.len()];
-        renderer.image(pose, &mut rendered).unwrap();
+        renderer.raster_images(std::slice::from_ref(pose), &mut rendered).unwrap();
         let map = renderer.depth_map(pose).unwrap();
 
+        let mut outlined = rendered.clone();
+        renderer.image(pose, &mut outlined).unwrap();
+
         let peak = exact.iter().copied().fold(0.0, f64::max);
-        let differences = exact.iter().zip(&rendered).map(|(exact, got)| (exact - f64::from(*got)).abs());
+        let error = |image: &[f32]| {
+            let differences = exact.iter().zip(image).map(|(exact, got)| (exact - f64::from(*got)).abs());
+            differences.fold(0.0, f64::max) / peak
+        };
+        let is_outlined = outlined != rendered;
         let touched = map.penetration_mm.iter().filter(|depth_mm| **depth_mm > 0.0).count();
         let sigma_cells = model.psf().sigma_mm(*covering) / map.cell_mm;
         let cells = (touched.max(1) as f64).min(4.0 * PI * sigma_cells * sigma_cells);
         Found {
-            error: differences.fold(0.0, f64::max) / peak,
+            error: error(&rendered),
+            outline_error: if is_outlined { error(&outlined) } else { 0.0 },
             bound: 2.0 * cells.powf(-0.75),
             touched,
             label: format!(
