@@ -14,10 +14,10 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The methods for a tool; `raster` needs a mesh.
+/// The methods for a tool; `outline` and `raster` need a mesh.
 fn methods(tool: Tool) -> &'static [Method] {
     match tool {
-        Tool::H => &[Method::PressTable, Method::Raster, Method::Exact],
+        Tool::H | Tool::TiltedH => &[Method::PressTable, Method::Outline, Method::Raster, Method::Exact],
         Tool::Cylinder => &[Method::PressTable, Method::Exact],
     }
 }

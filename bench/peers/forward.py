@@ -142,7 +142,7 @@ class Ours:
         return {"version": self.said["version"], "ready_s": self.said["ready_s"]}
 
 
-OURS = (("press-table", "h"), ("raster", "h"), ("exact", "h"), ("press-table", "cylinder"))
+OURS = (("press-table", "h"), ("outline", "h"), ("raster", "h"), ("exact", "h"), ("press-table", "cylinder"))
 
 
 class Peer:

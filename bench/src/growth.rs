@@ -35,14 +35,14 @@ impl Growth {
     /// If an image cannot be made.
     pub fn measure() -> Result<Vec<Self>> {
         let mut growths = Vec::new();
-        for method in [Method::PressTable, Method::Raster, Method::Exact] {
+        for method in [Method::PressTable, Method::Outline, Method::Raster, Method::Exact] {
             growths.push(Self::with_elements(Tool::H, method)?);
         }
         for method in [Method::PressTable, Method::Exact] {
             growths.push(Self::with_elements(Tool::Cylinder, method)?);
         }
         growths.extend(Self::with_triangles(Method::PressTable)?);
-        for method in [Method::Raster, Method::Exact] {
+        for method in [Method::Outline, Method::Raster, Method::Exact] {
             let [_, image] = Self::with_triangles(method)?;
             growths.push(image);
         }

@@ -69,7 +69,7 @@ impl Kernel {
     fn of_press_table(array: &Array, tool: Tool) -> Result<Self> {
         let mut painter = Painter::new(Method::PressTable, &model(array.clone())?, &tool.indenter())?;
         let channels = match tool {
-            Tool::H => 3.0,
+            Tool::H | Tool::TiltedH => 3.0,
             Tool::Cylinder => 1.0,
         };
         let reached = reached(&mut painter, array)?;

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
-use tactus_model::{Contact, ForwardModel, Indenter, PressTable};
+use anyhow::{Context as _, Result, bail};
+use tactus_model::{Contact, ForwardModel, Indenter, MeshImages, PressTable};
 use tactus_scene::{Attitude, Renderer};
 
 use crate::{COVERING, DEPTH_MAX_MM, Pose};
@@ -13,7 +13,9 @@ use crate::{COVERING, DEPTH_MAX_MM, Pose};
 pub enum Method {
     /// [`PressTable`]: samples a table of the tool's blurred and integrated footprint, which is made once.
     PressTable,
-    /// [`Renderer`]: draws the mesh into a depth map, then takes two matrix products; any attitude.
+    /// [`MeshImages`]: integrals along the outline of a closed mesh; any attitude.
+    Outline,
+    /// [`Renderer::raster_images`]: draws the mesh into a depth map, then takes two matrix products; any attitude and mesh.
     Raster,
     /// [`ForwardModel::image`]: closed forms and quadrature; the reference.
     Exact,
@@ -24,6 +26,8 @@ pub enum Method {
 pub enum Painter {
     /// See [`Method::PressTable`].
     PressTable(PressTable),
+    /// See [`Method::Outline`].
+    Outline(MeshImages),
     /// See [`Method::Raster`].
     Raster(Renderer),
     /// See [`Method::Exact`].
@@ -45,6 +49,13 @@ impl Painter {
     pub fn new(method: Method, model: &ForwardModel, indenter: &Indenter) -> Result<Self> {
         Ok(match method {
             Method::PressTable => Self::PressTable(PressTable::new(model, indenter, COVERING, DEPTH_MAX_MM)?),
+            Method::Outline => {
+                let Indenter::Mesh(mesh) = indenter else {
+                    bail!("the method `outline` needs a mesh, not {indenter:?}")
+                };
+                let images = MeshImages::new(model, Arc::clone(mesh), COVERING);
+                Self::Outline(images.context("the method `outline` needs a closed mesh")?)
+            }
             Method::Raster => {
                 let Indenter::Mesh(mesh) = indenter else {
                     bail!("the method `raster` needs a mesh, not {indenter:?}")
@@ -72,9 +83,15 @@ impl Painter {
         let Pose { position_mm, rotation_deg, depth_mm } = *pose;
         match self {
             Self::PressTable(table) => table.image(position_mm, rotation_deg, depth_mm, image)?,
+            Self::Outline(images) => {
+                let rotation = Attitude::upright(rotation_deg).matrix();
+                if !images.image(position_mm, rotation, depth_mm, image) {
+                    bail!("too much of the tool is hidden below the surface");
+                }
+            }
             Self::Raster(renderer) => {
                 let attitude = Attitude::upright(rotation_deg);
-                renderer.image(&tactus_scene::Pose { position_mm, attitude, depth_mm }, image)?;
+                renderer.raster_images(&[tactus_scene::Pose { position_mm, attitude, depth_mm }], image)?;
             }
             Self::Exact { model, contact, counts } => {
                 *contact =

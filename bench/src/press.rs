@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use tactus_model::{Array, Covering, Indenter, Mesh, MeshError};
+use tactus_scene::Attitude;
 use tactus_scene::shapes::Scene;
 
 /// The paper's thinnest covering, 0.04 inch.
@@ -20,6 +21,8 @@ const DEPTH_MIN_MM: f64 = 0.05;
 pub enum Tool {
     /// The block letter of `assets/h.stl`: 8 x 10 mm, strokes of 2 mm, 44 triangles.
     H,
+    /// The same, tilted by 2 and 1 degrees, as a tool in a real holder may be.
+    TiltedH,
     /// The paper's flat-ended cylinder of 1 mm.
     Cylinder,
 }
@@ -37,9 +40,15 @@ pub struct Pose {
 
 impl Tool {
     /// The tool's shape.
+    #[expect(clippy::missing_panics_doc, clippy::expect_used, reason = "a fixed shape, made in a test")]
     pub fn indenter(self) -> Indenter {
         match self {
             Self::H => Indenter::Mesh(Arc::new(Scene::H.mesh())),
+            Self::TiltedH => {
+                let tilt = Attitude { yaw_deg: 0.0, pitch_deg: 2.0, roll_deg: 1.0 };
+                let tilted = Scene::H.mesh().turned(tilt.matrix());
+                Indenter::Mesh(Arc::new(tilted.expect("the letter has a face below at any small tilt")))
+            }
             Self::Cylinder => Indenter::Cylinder { diameter_mm: 1.0 },
         }
     }
@@ -64,7 +73,7 @@ pub fn poses(array: &Array, count: u32) -> Vec<Pose> {
     (0..count).map(pose).collect()
 }
 
-/// The lower half of a sphere of 4 mm diameter, in about `triangles` triangles.
+/// The lower half of a sphere of 4 mm diameter under a lid, in about `triangles` triangles.
 ///
 /// # Errors
 /// If the triangles do not make a mesh.
@@ -91,6 +100,9 @@ pub fn fine_sphere(triangles: u32) -> Result<Indenter, MeshError> {
             }
         }
     }
+    vertices_mm.push([0.0, 0.0, RADIUS_MM]);
+    let (lid, rim) = (1 + rings * meridians, 1 + (rings - 1) * meridians);
+    faces.extend((0..meridians).map(|meridian| [rim + meridian, rim + (meridian + 1) % meridians, lid]));
     Ok(Indenter::Mesh(Arc::new(Mesh::new(&vertices_mm, &faces)?)))
 }
 

@@ -8,7 +8,7 @@ use crate::data::{Bins, Converter, DiscoverError, Floor, Frames, Known, Rounding
 use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
 use crate::next::Experiments;
 use crate::progress::{Progress, Reporter, Stage};
-use crate::search::{Candidate, Formed, Grown, Memory, Options, Rule, Search, not_shown};
+use crate::search::{Candidate, Formed, Grown, Memory, Options, Rule, Search, WORK_MOST, not_shown};
 use crate::verdict::{
     BaseModel, Confirmation, Discovery, SearchOutcome, cannot_judge, conclude, confirmation, confirmed,
 };
@@ -62,14 +62,23 @@ fn discover_on_threads(
         options,
         known_terms: known.effects.len() + prepared.faulty.effects.len(),
         rounds: prepared.rounds(),
+        may_be_rounding: prepared.noise.may_be_rounding(base.cost / problem.readings()),
+        work_most: WORK_MOST,
         memory: Memory::default(),
         reporter: &reporter,
     };
     let before = search.locate(base)?;
     reporter.enter(Stage::Scattering, "testing the scatter");
     let scattered = search.scattered(base)?;
-    let Grown { at: grown, rounds, mut equivalent, refused, exchanged, .. } = match options.rule {
-        Rule::Protocol => search.grow(base)?,
+    let Grown { at: grown, rounds, mut equivalent, refused, exchanged, is_cut, .. } = match options.rule {
+        Rule::Protocol => {
+            let t = std::time::Instant::now();
+            let g = search.grow(base)?;
+            if std::env::var("DBG_WORK").is_ok() {
+                eprintln!("WORK {} in {:?}", search.problem.predictor.work(), t.elapsed());
+            }
+            g
+        }
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
     let formed = match options.rule {
@@ -79,8 +88,17 @@ fn discover_on_threads(
     let (formed, mut contests) = search.contested(formed, &mut equivalent)?;
     contests.extend(refused);
     let confirmed = confirmed(&prepared, &search, formed, &equivalent)?;
-    let outcome =
-        SearchOutcome { lacking, confirmed, rounds, equivalent, contests, exchanged, before, scattered };
+    let outcome = SearchOutcome {
+        lacking,
+        confirmed,
+        rounds,
+        is_cut,
+        equivalent,
+        contests,
+        exchanged,
+        before,
+        scattered,
+    };
     conclude(&prepared, &search, outcome, experiments)
 }
 

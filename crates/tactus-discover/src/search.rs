@@ -48,7 +48,7 @@ pub(crate) use forms::{Formed, Refuted};
 pub(crate) use given_up::last_words;
 pub use given_up::{Because, GivenUp};
 pub(crate) use grow::{
-    ALPHA, Alike, Equivalent, FLIPS, Grown, Left, POLISH_ROUNDS, Search, Tried, names, without,
+    ALPHA, Alike, Equivalent, FLIPS, Grown, Left, POLISH_ROUNDS, Search, Tried, WORK_MOST, names, without,
 };
 pub use grow::{Round, TriedEffect};
 pub(crate) use locate::Located;

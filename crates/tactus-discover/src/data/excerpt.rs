@@ -12,8 +12,8 @@ use super::frames::Frames;
 use super::way::{WayPoint, bends};
 use crate::numbers::Rng;
 
-/// Greatest number of readings that are read: 23 minutes of the paper's sensor.
-const READINGS_MOST: usize = 48 * 42_000;
+/// Greatest number of readings that are read: 13 minutes of the paper's sensor.
+const READINGS_MOST: usize = 48 * 24_000;
 /// A part has at most one in so many of the frames that may be read.
 const PART_SHARE: usize = 16;
 /// Straight lines leave the way by at most so much.

@@ -1,6 +1,7 @@
 //! Predictions of a model for the bins.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use tactus_model::effect::PipelineStage;
 use tactus_model::{
@@ -18,6 +19,8 @@ pub(crate) struct Predictor<'a> {
     pub(crate) bins: &'a Bins,
     /// Cached images of presses, shared by all predictions.
     pub(crate) images: Arc<Images>,
+    /// Work of all predictions so far: see [`Predictor::work`].
+    work: Arc<AtomicU64>,
 }
 
 /// Greatest number of cached images of 48 elements, about 130 MB.
@@ -41,7 +44,19 @@ impl<'a> Predictor<'a> {
         bins: &'a Bins,
         images: &Arc<Images>,
     ) -> Self {
-        Self { known, frames, bins, images: Arc::clone(images) }
+        Self { known, frames, bins, images: Arc::clone(images), work: Arc::default() }
+    }
+
+    /// How much was computed so far, in predicted readings, each counted once and once more for each effect of its model. It depends on the
+    /// data and on what was asked alone, whatever the machine and the number of threads.
+    pub(crate) fn work(&self) -> u64 {
+        self.work.load(Ordering::Relaxed)
+    }
+
+    fn has_worked(&self, moments: usize, effects: usize) {
+        let readings = moments * self.bins.elements * (1 + effects);
+        // No sum of `usize` in a discovery exceeds `u64`.
+        self.work.fetch_add(u64::try_from(readings).unwrap_or(u64::MAX), Ordering::Relaxed);
     }
 
     /// Counts of every bin and element, without noise and rounding.
@@ -169,6 +184,7 @@ impl Stream<'_> {
         predicted: &mut Vec<f64>,
     ) -> Result<(), DiscoverError> {
         let (predictor, first_bin, first) = (self.predictor, self.bin, predicted.len());
+        predictor.has_worked(count, self.effects.len());
         for bin in first_bin..first_bin + count {
             let path = &predictor.bins.paths[predictor.bins.run[bin]];
             let (moment, pipeline) = (predictor.moment(bin), self.pipeline(bin)?);
@@ -196,6 +212,7 @@ impl Stream<'_> {
     ) -> Result<(), DiscoverError> {
         let Some(from) = self.from else { return self.take(count, wanted, predicted) };
         let (predictor, first_bin, first) = (self.predictor, self.bin, predicted.len());
+        predictor.has_worked(count, self.effects.len());
         let elements = predictor.bins.elements;
         let each = reached.signals_mm.len() / reached.contacts.len().max(1);
         let signals_mm = reached.signals_mm.chunks_exact(each.max(1));

@@ -31,6 +31,8 @@ fn gap(more: impl Fn(&[f64], f64) -> Vec<f64>) -> Vec<Gap> {
         options: OPTIONS,
         known_terms: 0,
         rounds: false,
+        may_be_rounding: false,
+        work_most: u64::MAX,
         memory: Memory::default(),
         reporter: &Reporter::new(&|_| {}),
     };

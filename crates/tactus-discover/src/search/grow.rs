@@ -59,6 +59,8 @@ pub(crate) const FLIPS: usize = 1999;
 pub(crate) const ALPHA: f64 = 0.005;
 /// Greatest number of added effects.
 pub(crate) const NAMES_MAX: usize = 5;
+/// Work after which a search takes no further class and exchanges none, in predicted readings ([`Predictor::work`](crate::fit::Predictor::work)).
+pub(crate) const WORK_MOST: u64 = 4_000_000_000;
 /// Rounds of a fit that compares candidates: of all, and of the best.
 const FIRST_ROUNDS: usize = 2;
 pub(super) const TRIAL_ROUNDS: usize = 6;
@@ -95,6 +97,10 @@ pub(crate) struct Search<'a> {
     pub(crate) known_terms: usize,
     /// True if the steps of the converter are wider than declared.
     pub(crate) rounds: bool,
+    /// True if what the base model leaves may be rounding and nothing else: then no class is added.
+    pub(crate) may_be_rounding: bool,
+    /// Work after which it takes no further class: [`WORK_MOST`].
+    pub(crate) work_most: u64,
     pub(crate) memory: Memory,
     pub(crate) reporter: &'a Reporter<'a>,
 }
@@ -145,6 +151,8 @@ pub(crate) struct Grown {
     pub(crate) refused: Vec<Contest>,
     /// Effects that another one replaced.
     pub(crate) exchanged: Vec<GivenUp>,
+    /// True if the search ended because it had done as much as it may.
+    pub(crate) is_cut: bool,
     /// Classes that lost their place against a rival, and the others of the model then: beside these they are not tried again.
     pub(super) barred: Vec<(Vec<&'static str>, &'static str)>,
 }
@@ -166,6 +174,7 @@ impl From<Fitted> for Grown {
             held: None,
             refused: Vec::new(),
             exchanged: Vec::new(),
+            is_cut: false,
             barred: Vec::new(),
         }
     }
@@ -200,7 +209,17 @@ impl Search<'_> {
             if grown.barred.len() == barred {
                 return Ok(grown);
             }
+            if self.is_spent() {
+                grown.is_cut = true;
+                return Ok(grown);
+            }
         }
+    }
+
+    /// True if the search has done as much as it may. What it costs is bounded on all data: those of which each class leaves much are the
+    /// most expensive, because each is tried in the place of each.
+    pub(super) fn is_spent(&self) -> bool {
+        self.problem.predictor.work() > self.work_most
     }
 
     /// Adds classes until none is missing.
@@ -216,12 +235,14 @@ impl Search<'_> {
             self.reporter
                 .enter(Stage::Testing { names: count }, &format!("round {round}: testing the scores"));
             let mut tried = self.tested(&pass, &grown.at, index);
-            let is_full = count >= NAMES_MAX || index >= 2 * NAMES_MAX;
+            let is_full = count >= NAMES_MAX || index >= 2 * NAMES_MAX || self.may_be_rounding;
             // What is small beside the gain of another class may be an error of that one's form.
             let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
             // The errors of coarse steps repeat, and are no noise.
             let ln_odds = if self.rounds { 0.0 } else { pass.most_ln_odds() };
-            let (fits, refused) = if is_missing(tried.p_value, ln_odds) && !is_full {
+            let is_open = is_missing(tried.p_value, ln_odds) && !is_full;
+            grown.is_cut |= is_open && self.is_spent();
+            let (fits, refused) = if is_open && !self.is_spent() {
                 self.reporter
                     .enter(Stage::Fitting { names: count }, &format!("round {round}: fitting effects"));
                 self.next(grown, &pass, least)?

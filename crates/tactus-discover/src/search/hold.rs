@@ -80,8 +80,9 @@ impl Search<'_> {
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
                 let likeliest = others.iter().max_by(|a, b| self.rank(a).total_cmp(&self.rank(b)));
                 let present = self.rank_of(name, ln_odds, &grown.at);
+                let may_exchange = exchanges_left > 0 && !self.is_spent();
                 let better =
-                    likeliest.filter(|best| self.rank(best) > present + BETTER_LN_ODDS && exchanges_left > 0);
+                    likeliest.filter(|best| self.rank(best) > present + BETTER_LN_ODDS && may_exchange);
                 if let Some(better) = better {
                     exchanges_left -= 1;
                     grown.exchanged.push(GivenUp { effect: name, because: Because::Other(better.name) });

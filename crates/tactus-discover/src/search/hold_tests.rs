@@ -32,6 +32,8 @@ fn names_that_have_held_their_place_are_not_judged_again() {
         options: OPTIONS,
         known_terms: 0,
         rounds: false,
+        may_be_rounding: false,
+        work_most: u64::MAX,
         memory: Memory::default(),
         reporter: &Reporter::new(&see),
     };
@@ -58,4 +60,33 @@ fn names_that_have_held_their_place_are_not_judged_again() {
     grown.barred.push((vec!["hardening", "softening"], "saturation"));
     assert!(search.is_back(&mut grown, 0));
     assert_eq!(grown.barred[1..], [(vec!["hardening"], "softening")]);
+}
+
+#[test]
+fn a_search_that_has_done_as_much_as_it_may_takes_nothing_more_and_says_so() {
+    let known = known();
+    let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(5));
+    let hidden = Effect::new("time-lag", [("lag_s", 0.15)]).unwrap();
+    let frames = measured(&known, &[hidden], &noise);
+    let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
+    let grown = |more_work: u64| {
+        // Each has counted its own work.
+        let problem = prepared.problem();
+        let candidates = Candidate::all(&problem, &prepared.base, &[]).unwrap();
+        let search = Search {
+            problem: &problem,
+            candidates: &candidates,
+            options: OPTIONS,
+            known_terms: 0,
+            rounds: false,
+            may_be_rounding: false,
+            work_most: problem.predictor.work() + more_work,
+            memory: Memory::default(),
+            reporter: &Reporter::new(&|_| {}),
+        };
+        let grown = search.grow(&prepared.base).unwrap();
+        (search.sorted_names(&grown.at), grown.is_cut)
+    };
+    assert_eq!(grown(0), (vec![], true));
+    assert_eq!(grown(u64::MAX / 2), (vec!["time-lag"], false));
 }

@@ -27,6 +27,8 @@ pub(crate) struct SearchOutcome {
     pub(crate) confirmed: Confirmed,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
+    /// True if the search ended because it had done as much as it may.
+    pub(crate) is_cut: bool,
     pub(crate) contests: Vec<Contest>,
     /// Effects that another one replaced.
     pub(crate) exchanged: Vec<GivenUp>,
@@ -36,6 +38,10 @@ pub(crate) struct SearchOutcome {
     pub(crate) scattered: Scattered,
 }
 
+/// Said where the search ended at its bound.
+const ENDED_EARLY: &str = "no class leaves little, and the search has done as much as it may: classes that it did not try beside \
+                           those in the report may be missing";
+
 /// Judges the outcome of a search and builds the report.
 pub(crate) fn conclude(
     prepared: &Prepared<'_>,
@@ -44,8 +50,17 @@ pub(crate) fn conclude(
     experiments: &dyn Experiments,
 ) -> Result<Discovery, DiscoverError> {
     let options = search.options;
-    let SearchOutcome { lacking, confirmed, rounds, mut equivalent, contests, exchanged, before, scattered } =
-        found;
+    let SearchOutcome {
+        lacking,
+        confirmed,
+        rounds,
+        is_cut,
+        mut equivalent,
+        contests,
+        exchanged,
+        before,
+        scattered,
+    } = found;
     let first = rounds.first();
     let base = &prepared.base;
     let of_base = prepared.held(&base.parameters)?;
@@ -109,6 +124,7 @@ pub(crate) fn conclude(
     let mut warnings = prepared.warnings.clone();
     warnings.extend(prepared.not_judged(&of_grown, floor));
     warnings.extend(few_presses);
+    warnings.extend(is_cut.then(|| ENDED_EARLY.to_owned()));
     Ok(Discovery {
         not_shown,
         warnings,

@@ -1,11 +1,11 @@
-use rand::SeedableRng;
+use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_schema::table::{Phase, RowView};
 
 use super::*;
-use crate::fixtures::{ELEMENTS, ShippedRig, found, known, measured, processes};
+use crate::fixtures::{ELEMENTS, ShippedRig, base, found, known, measured, processes};
 use crate::verdict::held_out::SEEN_NOISE;
-use crate::{Floor, Frames, Rule, discover};
+use crate::{Floor, Frames, Rule, discover, predict};
 
 /// The deepest frame of each press, as in a table of averaged presses. Each element is pressed this many times.
 fn one_frame_a_press(repeats: usize, noise_counts: f64) -> Frames {
@@ -79,4 +79,42 @@ fn runs_of_one_rig_may_differ_in_gain_and_zeros() {
     let [one, other] = found.grown.run_gains[..] else { panic!("two runs: {:?}", found.grown.run_gains) };
     assert!((other / one - 1.02).abs() < 1e-3, "{other} / {one}");
     assert!((one * other - 1.0).abs() < 1e-9, "the mean is 1: {one} {other}");
+}
+
+/// Without noise a converter gives the same code whenever nothing touches, so that a zero is known to half a step. Each element seems to be off by
+/// its own part of a step while the tool touches.
+#[test]
+fn rounding_without_noise_hides_nothing() {
+    let known = known();
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let presses = measured(&known, &[], &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
+    let mut exact = Frames::new(ELEMENTS);
+    let mut times_ns = (0..).step_by(100_000_000);
+    let (mut press, mut share) = (-1, 1.0);
+    for row in presses.rows() {
+        if row.press != press {
+            (press, share) = (row.press, rng.random_range(0.5..1.0));
+        }
+        let [x, y, z] = row.position_mm;
+        // Each press has a depth of its own, and rests are long enough to tell what the noise is.
+        let position_mm = [x, y, if z < 0.0 { share * z } else { z }];
+        let repeats = if matches!(row.phase, Phase::Hold | Phase::Idle) { 4 } else { 1 };
+        for t_ns in times_ns.by_ref().take(repeats) {
+            exact.push(RowView { t_ns, position_mm, ..row });
+        }
+    }
+    let counts = predict(&known, &exact, &base(&known), &[]).unwrap();
+    let off = |element: usize| 0.9 * (element as f32 * 0.618).fract() - 0.45;
+    let mut rounded = Frames::new(ELEMENTS);
+    for (row, counts) in exact.rows().zip(counts.chunks_exact(ELEMENTS)) {
+        let counts: Vec<f32> =
+            (0..).zip(counts).map(|(element, counts)| (counts + off(element)).round()).collect();
+        rounded.push(RowView { counts: &counts, ..row });
+    }
+    let found = found(&known, &rounded);
+    let names: Vec<_> = found.steps.iter().map(|step| step.effect).collect();
+    assert_eq!((found.verdict, names), (Verdict::NothingMissing, vec![]), "{:?}", found.gap);
+    assert!(found.draft.is_none());
+    let structured = found.base.structured.unwrap();
+    assert!((0.1..1.0).contains(&structured.upper_noise), "{structured:?}");
 }

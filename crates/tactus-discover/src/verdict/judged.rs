@@ -103,21 +103,26 @@ impl Judge<'_> {
         let held = prepared.held(&grown.parameters)?;
         let of_noise = [scattered, prepared.own_noise(&held)];
         let of_tests = [left.p_value, after.p_value, of_noise[0].p_value, of_noise[1].p_value];
-        let is_left = least_p_value(of_tests) <= ALPHA;
         let floor = prepared.floor_of(&held);
         let levels = [of_base, &held].map(|held| prepared.level(held, floor));
+        let upper_noise = levels[1].structured.map_or(f64::INFINITY, |part| part.upper_noise);
+        // Each test sees what repeats of rounding.
+        let may_be_rounding = prepared.noise.may_be_rounding(upper_noise * upper_noise);
+        let is_left = least_p_value(of_tests) <= ALPHA && !may_be_rounding;
         let has_gap = self.p_value <= ALPHA;
         let closed = if has_gap { prepared.closed([of_base, &held], grown, floor)? } else { None };
         let is_named = !names(&grown.parameters, search.known_terms).is_empty();
         let tolerance_counts = search.options.tolerance_counts;
         let evidence = Evidence {
             is_named: is_named || converter.is_some() || !faulty.effects.is_empty(),
-            is_missing: search.options.rule == Rule::Protocol && (has_gap || has_refused(self.contests)),
+            is_missing: search.options.rule == Rule::Protocol
+                && (has_gap || has_refused(self.contests))
+                && (is_named || !may_be_rounding),
             is_left,
             closed_most: closed.map_or(f64::INFINITY, |closed| {
                 closed.share + closed.standard_error.unwrap_or(f64::INFINITY)
             }),
-            upper_noise: levels[1].structured.map_or(f64::INFINITY, |part| part.upper_noise),
+            upper_noise,
             tolerance_noise: tolerance_counts
                 .zip(floor.rms_counts())
                 .map_or(0.0, |(tolerance, noise)| tolerance / noise),

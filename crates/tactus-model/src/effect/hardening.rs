@@ -75,7 +75,8 @@ enum Growth {
 impl OnCovering for Hardening {
     fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
         let depth_mm = depth_mm(now.base, contact);
-        for u in signal_mm {
+        // An element that feels nothing feels no more of it; most do, between presses.
+        for u in signal_mm.iter_mut().filter(|u| **u != 0.0) {
             *u *= 1.0 + self.growth.at(self.argument_mm(depth_mm, *u));
         }
     }
