@@ -79,7 +79,8 @@
 //! # Speed
 //!
 //! A [`PressTable`] interpolates a tool's image from a table made once: about 1.7 million images a second on one core, for
-//! any mesh on 48 elements. The exact image takes 7 us for a cylinder and 500 us for the H.
+//! any mesh on 48 elements. [`MeshImages`] make 390,000 a second of a closed mesh in any attitude, without a table. The exact image takes
+//! 7 us for a cylinder and 65 us for the H.
 //!
 //! This crate has no I/O, no async, no clock and no global random numbers.
 //!

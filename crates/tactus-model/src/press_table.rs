@@ -16,13 +16,13 @@ use layers::Layers;
 /// T(p, theta, depth) = integral over the square of (I_depth * G_sigma)
 /// ```
 ///
-/// is smooth in all its arguments because the blur has removed fine detail. So `T` is computed once with the exact method
-/// and then interpolated: by cubic B-splines over `p` (nodes a sixth of the blur apart), by three nodes of a
+/// is smooth in all its arguments because the blur has removed fine detail. So `T` is computed once, as a sum of the waves that the blur
+/// leaves, and then interpolated: by cubic B-splines over `p` (nodes a sixth of the blur apart), by three nodes of a
 /// trigonometric polynomial over the quarter turn under which a square is symmetric, and by cubic Hermite polynomials
-/// over depth, whose pieces end where the contact area jumps. Round tools need one rotation, and tools with a flat
+/// over depth, whose pieces end where the contact area jumps and are halved until they are close enough. Round tools need one rotation, and tools with a flat
 /// underside one depth. An image takes 16 to 192 multiplications per element, for any mesh.
 ///
-/// Accuracy: within 5e-5 of the greatest rise of [`ForwardModel::image`], for elements no larger than the blur's `sigma`
+/// Accuracy: within 5e-5 of the greatest rise of [`ForwardModel::image`] at the greatest depth, for elements no larger than the blur's `sigma`
 /// (the tests and benchmarks print it). Values are `f32`; their last bits depend on the processor.
 ///
 /// ```
@@ -80,7 +80,7 @@ pub enum PressTableError {
 impl PressTable {
     /// Makes the press table of a tool under a covering for depths up to `depth_max_mm`, in mm.
     ///
-    /// Takes milliseconds for flat tools and seconds for finely tessellated ones.
+    /// Takes a millisecond for flat tools, some 20 for those that are tilted, and more for finely tessellated ones.
     ///
     /// # Errors
     /// [`PressTableError::DepthMax`] unless `0 < depth_max_mm <= ` the covering's thickness; [`PressTableError::Fine`] if the
