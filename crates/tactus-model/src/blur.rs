@@ -72,7 +72,7 @@ impl Blur {
         let [[once, twice], [once_beyond, twice_beyond]] = [least, greatest].map(|edge_mm| {
             let z = (at_mm - edge_mm) / self.sigma_mm;
             let (density, below) = (density(z), upper_tail(-z));
-            [z * below + density, ((z * z + 1.0) * below + z * density) / 2.0]
+            [z * below + density, f64::midpoint((z * z + 1.0) * below, z * density)]
         });
         [self.sigma_mm * (once - once_beyond), self.sigma_mm * self.sigma_mm * (twice - twice_beyond)]
     }

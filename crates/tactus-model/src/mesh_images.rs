@@ -289,7 +289,7 @@ impl WithSimd for Integral<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        self.to_middle(simd);
+        self.start_in_middle(simd);
         for Edge { ends_mm: [from, to], rim, bend } in self.edges {
             let goes: [f64; 3] = std::array::from_fn(|axis| to[axis] - from[axis]);
             if goes[1] == 0.0 {
@@ -313,9 +313,9 @@ impl WithSimd for Integral<'_> {
 }
 
 impl Integral<'_> {
-    /// The integrals up to the middle.
+    /// Computes the integrals up to the middle.
     #[inline(always)]
-    fn to_middle<S: Simd>(&mut self, simd: S) {
+    fn start_in_middle<S: Simd>(&mut self, simd: S) {
         let (line, dx) = self.tables.columns.near(self.middle_mm);
         let (line, width) = (S::as_simd_f64s(line).0, S::as_simd_f64s(line).0.len() / ORDERS);
         let [all, half, third, quarter] =

@@ -40,9 +40,9 @@ fn they_agree_with_the_exact_image() {
         let elements = model.array().elements();
         let (mut exact, mut counts) = (vec![0.0; elements], vec![0.0; elements]);
         let (mut worst, mut peak) = (0.0_f64, 0.0_f64);
-        for pose in 0..24 {
-            let share = |step: f64| (f64::from(pose) * step).fract();
-            let tilt_deg = [0.0, 1.0, 8.0, 70.0][pose as usize % 4];
+        for pose in 0..24_usize {
+            let share = |step: f64| (pose as f64 * step).fract();
+            let tilt_deg = [0.0, 1.0, 8.0, 70.0][pose % 4];
             let attitude =
                 rotation([360.0 * share(0.618), tilt_deg * share(0.414), -tilt_deg * share(0.281)]);
             let extent_mm = model.array().extent_mm();

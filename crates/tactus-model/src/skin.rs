@@ -76,14 +76,13 @@ impl Skin {
                 known[triangle] += 1;
             }
         }
-        const UNKNOWN: usize = usize::MAX;
-        let mut shells = vec![UNKNOWN; self.triangles.len()];
+        let mut shells = vec![None; self.triangles.len()];
         let mut count = 0;
         for first in 0..self.triangles.len() {
-            if shells[first] != UNKNOWN {
+            if shells[first].is_some() {
                 continue;
             }
-            shells[first] = count;
+            shells[first] = Some(count);
             let mut members = vec![first];
             let mut next = 0;
             while let Some(triangle) = members.get(next).copied() {
@@ -94,8 +93,8 @@ impl Skin {
                     let neighbour = if one == triangle { other } else { one };
                     let is_turned =
                         has(self.triangles[triangle], ends) == has(self.triangles[neighbour], ends);
-                    if shells[neighbour] == UNKNOWN {
-                        shells[neighbour] = count;
+                    if shells[neighbour].is_none() {
+                        shells[neighbour] = Some(count);
                         members.push(neighbour);
                         if is_turned {
                             self.triangles[neighbour].swap(1, 2);
@@ -110,7 +109,9 @@ impl Skin {
                 return None;
             }
             if volume < 0.0 {
-                members.iter().for_each(|member| self.triangles[*member].swap(1, 2));
+                for member in members {
+                    self.triangles[member].swap(1, 2);
+                }
             }
             count += 1;
         }
@@ -119,7 +120,7 @@ impl Skin {
                 seam.beside.swap(0, 1);
             }
         }
-        Some(shells)
+        shells.into_iter().collect()
     }
 
     /// Six times the signed volume between a triangle and the first point.

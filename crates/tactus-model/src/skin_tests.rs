@@ -30,7 +30,8 @@ const BOX: [[u32; 3]; 12] = [
 /// Several boxes in one mesh, each by its place and size.
 fn boxes(boxes: &[([f64; 3], [f64; 3])]) -> Mesh {
     let vertices_mm: Vec<_> = boxes.iter().flat_map(|(place, size)| corners(*place, *size)).collect();
-    let triangles = (0..boxes.len() as u32).flat_map(|of| BOX.map(|corners| corners.map(|c| 8 * of + c)));
+    let triangles =
+        (0_u32..).zip(boxes).flat_map(|(of, _)| BOX.map(|corners| corners.map(|corner| 8 * of + corner)));
     Mesh::new(&vertices_mm, &triangles.collect::<Vec<_>>()).unwrap()
 }
 
