@@ -29,7 +29,7 @@ pub enum Painter {
     /// See [`Method::Outline`].
     Outline(MeshImages),
     /// See [`Method::Raster`].
-    Raster(Renderer),
+    Raster(Box<Renderer>),
     /// See [`Method::Exact`].
     Exact {
         /// The exact forward model.
@@ -60,7 +60,7 @@ impl Painter {
                 let Indenter::Mesh(mesh) = indenter else {
                     bail!("the method `raster` needs a mesh, not {indenter:?}")
                 };
-                Self::Raster(Renderer::new(model.clone(), COVERING, Arc::clone(mesh))?)
+                Self::Raster(Box::new(Renderer::new(model.clone(), COVERING, Arc::clone(mesh))?))
             }
             Method::Exact => Self::Exact {
                 model: model.clone(),

@@ -71,14 +71,7 @@ fn discover_on_threads(
     reporter.enter(Stage::Scattering, "testing the scatter");
     let scattered = search.scattered(base)?;
     let Grown { at: grown, rounds, mut equivalent, refused, exchanged, is_cut, .. } = match options.rule {
-        Rule::Protocol => {
-            let t = std::time::Instant::now();
-            let g = search.grow(base)?;
-            if std::env::var("DBG_WORK").is_ok() {
-                eprintln!("WORK {} in {:?}", search.problem.predictor.work(), t.elapsed());
-            }
-            g
-        }
+        Rule::Protocol => search.grow(base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
     let formed = match options.rule {
@@ -92,8 +85,8 @@ fn discover_on_threads(
         lacking,
         confirmed,
         rounds,
-        is_cut,
         equivalent,
+        is_cut,
         contests,
         exchanged,
         before,

@@ -50,17 +50,8 @@ pub(crate) fn conclude(
     experiments: &dyn Experiments,
 ) -> Result<Discovery, DiscoverError> {
     let options = search.options;
-    let SearchOutcome {
-        lacking,
-        confirmed,
-        rounds,
-        is_cut,
-        mut equivalent,
-        contests,
-        exchanged,
-        before,
-        scattered,
-    } = found;
+    let SearchOutcome { lacking, confirmed, rounds, mut equivalent, contests, exchanged, .. } = found;
+    let SearchOutcome { is_cut, before, scattered, .. } = found;
     let first = rounds.first();
     let base = &prepared.base;
     let of_base = prepared.held(&base.parameters)?;
@@ -121,13 +112,13 @@ pub(crate) fn conclude(
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
     let is_added = !names.is_empty() || prepared.converter.is_some();
     let share = share_unexplained(verdict, is_added, search.share_left(base, &grown));
-    let mut warnings = prepared.warnings.clone();
-    warnings.extend(prepared.not_judged(&of_grown, floor));
-    warnings.extend(few_presses);
-    warnings.extend(is_cut.then(|| ENDED_EARLY.to_owned()));
+    let ended_early = is_cut.then(|| ENDED_EARLY.to_owned());
+    let of_search = few_presses.into_iter().chain(ended_early);
+    let warnings =
+        prepared.warnings.iter().cloned().chain(prepared.not_judged(&of_grown, floor)).chain(of_search);
     Ok(Discovery {
         not_shown,
-        warnings,
+        warnings: warnings.collect(),
         floor,
         global: Some(GlobalTest { statistic: before.statistic, p_value }),
         curves: search.curves(base, &grown)?,
