@@ -27,7 +27,7 @@ pub struct Forward {
     pub ready_s: f64,
     /// Rate of all threads together.
     pub images_per_s: f64,
-    /// Greatest difference of an element from the exact image, as a share of that image's peak; `None` if no image was
+    /// Greatest difference of an element from the exact image, as a share of the greatest peak of those images; `None` if none was
     /// compared.
     pub error: Option<f64>,
 }
@@ -78,13 +78,13 @@ fn images_per_s(painter: &Painter, array: &Array, threads: usize, time: Duration
 fn error(mut painter: Painter, mut exact: Painter, array: &Array, compared: u32) -> Result<Option<f64>> {
     let mut got = vec![0.0; array.elements()];
     let mut want = got.clone();
-    let mut worst: Option<f32> = None;
+    let (mut worst, mut highest) = (0.0_f32, 0.0_f32);
     for pose in poses(array, compared) {
         painter.image(&pose, &mut got)?;
         exact.image(&pose, &mut want)?;
         let peak = want.iter().copied().fold(0.0, f32::max);
         let off = got.iter().zip(&want).map(|(got, want)| (got - want).abs()).fold(0.0, f32::max);
-        worst = Some(worst.unwrap_or(0.0).max(off / peak));
+        (worst, highest) = (worst.max(off), highest.max(peak));
     }
-    Ok(worst.map(f64::from))
+    Ok((highest > 0.0).then(|| f64::from(worst / highest)))
 }

@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::Mesh;
+use crate::fixtures::{block, rotation};
 
 const THIN: Covering = Covering { thickness_mm: 1.016 };
 /// Thick enough for the half ball.
@@ -148,14 +149,8 @@ fn a_mesh_agrees_with_the_box_that_it_is() {
     }
 }
 
-/// A block of 3 x 1 x 2 mm: closed, unlike the mesh above, so that its image follows from its edges.
-fn block() -> Mesh {
-    let square = |z: f64| [[-1.5, -0.5, z], [1.5, -0.5, z], [1.5, 0.5, z], [-1.5, 0.5, z]];
-    let corners = [square(0.0), square(2.0)].concat();
-    let sides = (0..4_u32).flat_map(|k| [[k, (k + 1) % 4, 4 + k], [(k + 1) % 4, 4 + (k + 1) % 4, 4 + k]]);
-    let ends = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
-    Mesh::new(&corners, &ends.into_iter().chain(sides).collect::<Vec<_>>()).unwrap()
-}
+/// Closed, unlike the mesh above, so that its image follows from its edges.
+const BLOCK_MM: [f64; 3] = [3.0, 1.0, 2.0];
 
 #[test]
 fn a_closed_mesh_agrees_with_the_box_that_it_is() {
@@ -163,7 +158,7 @@ fn a_closed_mesh_agrees_with_the_box_that_it_is() {
         let model = digitacts(Psf { sigma_intercept_mm: sigma_mm, sigma_per_mm: 0.0 });
         for rotation_deg in [0.0, 30.0, 90.0] {
             let press = |indenter| Contact { rotation_deg, ..at(indenter, [6.3, 5.2], 0.5) };
-            let mesh = press(Indenter::Mesh(Arc::new(block())));
+            let mesh = press(Indenter::Mesh(Arc::new(block(BLOCK_MM))));
             assert!(matches!(mesh.pressed(Cut::Penetration, [0.0; 2], 1.0), Pressed::Outline(_)));
             let (got, want) = (indentation(&model, &mesh, THIN), indentation(&model, &press(BOX), THIN));
             let most = got.iter().zip(&want).map(|(got, want)| (got - want).abs()).fold(0.0, f64::max);
@@ -176,10 +171,8 @@ fn a_closed_mesh_agrees_with_the_box_that_it_is() {
 fn edges_and_slices_of_a_tilted_mesh_give_one_image() {
     for sigma_mm in [0.5, 2.7] {
         let model = digitacts(Psf { sigma_intercept_mm: sigma_mm, sigma_per_mm: 0.0 });
-        for [pitch_deg, roll_deg] in [[0.3_f64, 0.1], [2.0, -5.0], [40.0, 25.0]] {
-            let [(sb, cb), (sc, cc)] = [pitch_deg, roll_deg].map(|deg| deg.to_radians().sin_cos());
-            let tilted =
-                block().turned([[cb, sb * sc, sb * cc], [0.0, cc, -sc], [-sb, cb * sc, cb * cc]]).unwrap();
+        for [pitch_deg, roll_deg] in [[0.3, 0.1], [2.0, -5.0], [40.0, 25.0]] {
+            let tilted = block(BLOCK_MM).turned(rotation([0.0, pitch_deg, roll_deg])).unwrap();
             let contact =
                 Contact { rotation_deg: 20.0, ..at(Indenter::Mesh(Arc::new(tilted)), [6.3, 5.2], 0.4) };
             let got = indentation(&model, &contact, THIN);
@@ -199,7 +192,7 @@ fn an_outline_that_goes_deeper_blurs_as_before_to_the_bit() {
     for (position_mm, depth_mm) in
         [([6.3, 5.2], 0.1), ([6.3, 5.2], 0.4), ([7.0, 5.2], 0.4), ([7.0, 5.2], 0.2)]
     {
-        let contact = at(Indenter::Mesh(Arc::new(block())), position_mm, depth_mm);
+        let contact = at(Indenter::Mesh(Arc::new(block(BLOCK_MM))), position_mm, depth_mm);
         let load = Load { weight: 1.0, contact: contact.clone(), lean: [0.0; 2], sigma_mm: [2.7; 2] };
         let mut again = vec![0.0; 48];
         model.indentation_again(&load, THIN, &mut shares, &mut again);

@@ -95,6 +95,8 @@ mod array;
 mod blur;
 mod contact;
 mod covering;
+#[cfg(test)]
+mod fixtures;
 mod forward;
 mod gradient;
 mod images;

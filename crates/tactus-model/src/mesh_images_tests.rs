@@ -1,4 +1,5 @@
 use super::*;
+use crate::fixtures::{block, rotation};
 use crate::{Array, Contact, Indenter, Psf, Response};
 
 const COVERING: Covering = Covering { thickness_mm: 1.016 };
@@ -10,22 +11,8 @@ fn model(array: Array, psf: Psf) -> ForwardModel {
     ForwardModel::new(array, psf, response).unwrap()
 }
 
-/// A frustum of four sides, whose lower face is smaller.
-fn frustum() -> Arc<Mesh> {
-    let square = |half: f64, z: f64| [[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]];
-    let vertices_mm = [square(1.5, 0.0), square(2.5, 4.0)].concat();
-    let sides = (0..4_u32).flat_map(|k| [[k, (k + 1) % 4, 4 + k], [(k + 1) % 4, 4 + (k + 1) % 4, 4 + k]]);
-    let ends = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
-    Arc::new(Mesh::new(&vertices_mm, &ends.into_iter().chain(sides).collect::<Vec<_>>()).unwrap())
-}
-
-fn rotation([yaw, pitch, roll]: [f64; 3]) -> [[f64; 3]; 3] {
-    let [(sa, ca), (sb, cb), (sc, cc)] = [yaw, pitch, roll].map(|deg: f64| deg.to_radians().sin_cos());
-    [
-        [ca * cb, ca * sb * sc - sa * cc, ca * sb * cc + sa * sc],
-        [sa * cb, sa * sb * sc + ca * cc, sa * sb * cc - ca * sc],
-        [-sb, cb * sc, cb * cc],
-    ]
+fn mesh() -> Arc<Mesh> {
+    Arc::new(block([3.0, 4.0, 5.0]))
 }
 
 #[test]
@@ -35,7 +22,7 @@ fn they_agree_with_the_exact_image() {
         model(array, psf)
     };
     for model in [model(Array::digitacts(), Psf::PAPER), one_pitch(Array::fingertip())] {
-        let mesh = frustum();
+        let mesh = mesh();
         let mut images = MeshImages::new(&model, Arc::clone(&mesh), COVERING).unwrap();
         let elements = model.array().elements();
         let (mut exact, mut counts) = (vec![0.0; elements], vec![0.0; elements]);
@@ -72,7 +59,7 @@ fn they_agree_with_the_exact_image() {
 #[test]
 fn a_tool_above_the_surface_or_far_away_leaves_the_baseline() {
     let model = model(Array::digitacts(), Psf::PAPER);
-    let mut images = MeshImages::new(&model, frustum(), COVERING).unwrap();
+    let mut images = MeshImages::new(&model, mesh(), COVERING).unwrap();
     let upright = rotation([0.0; 3]);
     for (x, depth_mm) in [(5.0, 0.0), (5.0, -1.0), (300.0, 0.5), (-300.0, 0.5)] {
         let mut counts = vec![0.0; 48];
@@ -84,7 +71,7 @@ fn a_tool_above_the_surface_or_far_away_leaves_the_baseline() {
 #[test]
 fn a_copy_makes_the_same_images() {
     let model = model(Array::digitacts(), Psf::PAPER);
-    let mut images = MeshImages::new(&model, frustum(), COVERING).unwrap();
+    let mut images = MeshImages::new(&model, mesh(), COVERING).unwrap();
     let (mut one, mut other) = (vec![0.0; 48], vec![0.0; 48]);
     let tilted = rotation([20.0, 3.0, -2.0]);
     images.image([8.0, 6.0], tilted, 0.4, &mut one);

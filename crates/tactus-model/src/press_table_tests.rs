@@ -1,6 +1,7 @@
 use std::sync::Arc;
 
 use super::*;
+use crate::fixtures::{block, rotation};
 use crate::{Array, Mesh, Psf, Response};
 
 const COVERING: Covering = Covering { thickness_mm: 1.016 };
@@ -84,17 +85,7 @@ fn it_agrees_with_the_exact_image() {
 
 /// A block that is tilted a little, so that the touched area sweeps over its face within a tenth of a millimetre.
 fn tilted_block() -> Indenter {
-    let corners: Vec<_> = [0.0, 4.0]
-        .iter()
-        .flat_map(|z| [[-3.0, -4.0, *z], [3.0, -4.0, *z], [3.0, 4.0, *z], [-3.0, 4.0, *z]])
-        .collect();
-    let sides = (0..4_u32).flat_map(|k| [[k, (k + 1) % 4, 4 + k], [(k + 1) % 4, 4 + (k + 1) % 4, 4 + k]]);
-    let ends = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
-    let block = Mesh::new(&corners, &ends.into_iter().chain(sides).collect::<Vec<_>>()).unwrap();
-    let [(sb, cb), (sc, cc)] = [1.0_f64, 0.5].map(|deg| deg.to_radians().sin_cos());
-    Indenter::Mesh(Arc::new(
-        block.turned([[cb, sb * sc, sb * cc], [0.0, cc, -sc], [-sb, cb * sc, cb * cc]]).unwrap(),
-    ))
+    Indenter::Mesh(Arc::new(block([6.0, 8.0, 4.0]).turned(rotation([0.0, 1.0, 0.5])).unwrap()))
 }
 
 #[test]

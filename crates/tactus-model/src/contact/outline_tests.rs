@@ -2,19 +2,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::Mesh;
-
-/// A prism over an outline, counter-clockwise seen from above, that is cut into the given triangles.
-fn prism(outline: &[[f64; 2]], face: &[[u32; 3]], height_mm: f64) -> Mesh {
-    let count = u32::try_from(outline.len()).unwrap();
-    let at = |z: f64| outline.iter().map(move |[x, y]| [*x, *y, z]);
-    let walls = (0..count).flat_map(|side| {
-        let next = (side + 1) % count;
-        [[side, next, count + next], [side, count + next, count + side]]
-    });
-    let ends = face.iter().flat_map(|[a, b, c]| [[*a, *c, *b], [count + a, count + b, count + c]]);
-    let vertices_mm: Vec<_> = at(0.0).chain(at(height_mm)).collect();
-    Mesh::new(&vertices_mm, &walls.chain(ends).collect::<Vec<_>>()).unwrap()
-}
+use crate::fixtures::{prism, rotation};
 
 /// A letter with a notch, so that parts of it hide others when it leans.
 fn letter() -> Mesh {
@@ -23,8 +11,7 @@ fn letter() -> Mesh {
 }
 
 fn turned(mesh: &Mesh, [pitch_deg, roll_deg]: [f64; 2]) -> Mesh {
-    let [(sb, cb), (sc, cc)] = [pitch_deg, roll_deg].map(|deg: f64| deg.to_radians().sin_cos());
-    mesh.turned([[cb, sb * sc, sb * cc], [0.0, cc, -sc], [-sb, cb * sc, cb * cc]]).unwrap()
+    mesh.turned(rotation([0.0, pitch_deg, roll_deg])).unwrap()
 }
 
 fn contact(mesh: Mesh, depth_mm: f64) -> Contact {
