@@ -309,6 +309,14 @@ discovery-glance:
     target/dist/tactus-bench evidence score --seeds sealed --size glance --work target/evidence/glance/work \
         --labels target/evidence/glance/labels --document docs/discovery-evidence.md --images docs/images
 
+# Some 15 minutes on two cores; reports are in a folder for each build, so a rerun goes on where it ended.
+# What discovery finds in 42 sets that another program makes, which shares no code with ours: docs/discovery-evidence.md.
+discovery-independent: bench-peers-tools
+    cargo build --profile dist --package tactus
+    {{ tools }}/peers/bin/python bench/independent/make.py --seed 2 --out target/evidence/independent/sets
+    {{ tools }}/peers/bin/python bench/independent/judge.py --tactus target/dist/tactus --sets target/evidence/independent/sets \
+        --out target/evidence/independent/$(sha256sum target/dist/tactus | cut -c 1-12) --document docs/discovery-evidence.md
+
 # Some 1,500 sets, two to four hours on two cores; it goes on where it was cut off, and says how long it still takes. Further workers help
 # by the same `evidence run`, also on machines that see the folder.
 # What discovery finds and names of hidden physics, beside other ways to go about it: docs/discovery-evidence.md.
