@@ -184,39 +184,25 @@ impl Maker<'_> {
         let mut ends_mm: Vec<f64> = [0.0, depth_max_mm].into_iter().chain(jumps_mm).collect();
         ends_mm.sort_by(f64::total_cmp);
         ends_mm.dedup_by(|after, before| *after - *before < least_mm);
-        let at = |depth_mm: f64, jumps: bool| AtDepth {
+        let given: Vec<AtDepth> =
+            ends_mm.iter().map(|end_mm| self.at_depth(*end_mm, aside_mm, true)).collect();
+        let most = PIECE_ERROR_MAX * given.last().map_or(0.0, |deepest| deepest.value.bound());
+        let mut given = given.into_iter();
+        let mut ends: Vec<AtDepth> = given.next().into_iter().collect();
+        for to in given {
+            let middle = |from_mm, to_mm| self.at_depth(f64::midpoint(from_mm, to_mm), aside_mm, false);
+            halve(&mut ends, to, HALVINGS_MAX, most, &middle);
+        }
+        Depth::Pieces(self.pieces(&ends))
+    }
+
+    fn at_depth(&self, depth_mm: f64, aside_mm: f64, jumps: bool) -> AtDepth {
+        AtDepth {
             depth_mm,
             value: self.waves(Cut::Penetration, depth_mm),
             slope: self.waves(Cut::Footprint, depth_mm + aside_mm),
             slope_above: jumps.then(|| self.waves(Cut::Footprint, depth_mm - aside_mm)),
-        };
-        let mut ends: Vec<AtDepth> = ends_mm.iter().map(|end_mm| at(*end_mm, true)).collect();
-        let most = PIECE_ERROR_MAX * ends.last().map_or(0.0, |deepest| deepest.value.bound());
-        // From the top down, each as often as needed.
-        let mut halved = Vec::new();
-        let mut to_halve: Vec<(AtDepth, u32)> = ends.drain(..).rev().map(|end| (end, 0)).collect();
-        while let Some((from, _)) = to_halve.pop() {
-            while let Some((to, halvings)) = to_halve.last()
-                && *halvings < HALVINGS_MAX
-            {
-                let halvings = halvings + 1;
-                let middle = at(f64::midpoint(from.depth_mm, to.depth_mm), false);
-                let weights = weights(from.depth_mm, to.depth_mm, middle.depth_mm);
-                let above = to.slope_above.as_ref().unwrap_or(&to.slope);
-                let cubic = [&from.value, &to.value, &from.slope, above];
-                let [a, b, c, d] = std::array::from_fn(|channel| (cubic[channel], weights[channel]));
-                if Waves::sum([(&middle.value, 1.0), minus(a), minus(b), minus(c), minus(d)]).bound() <= most
-                {
-                    break;
-                }
-                if let Some((_, halvings_of_rest)) = to_halve.last_mut() {
-                    *halvings_of_rest = halvings;
-                }
-                to_halve.push((middle, halvings));
-            }
-            halved.push(from);
         }
-        Depth::Pieces(self.pieces(&halved))
     }
 
     /// Pieces between depths.
@@ -250,8 +236,39 @@ impl Maker<'_> {
     }
 }
 
-fn minus((field, weight): (&Waves, f64)) -> (&Waves, f64) {
-    (field, -weight)
+/// Appends the depth `to` to those before, and first such depths between it and the last that each cubic is off by at most `most` in its middle.
+fn halve(
+    ends: &mut Vec<AtDepth>,
+    to: AtDepth,
+    halvings_left: u32,
+    most: f64,
+    middle: &impl Fn(f64, f64) -> AtDepth,
+) {
+    if halvings_left > 0
+        && let Some(from) = ends.last()
+    {
+        let between = middle(from.depth_mm, to.depth_mm);
+        if off(from, &to, &between) > most {
+            halve(ends, between, halvings_left - 1, most, middle);
+            halve(ends, to, halvings_left - 1, most, middle);
+            return;
+        }
+    }
+    ends.push(to);
+}
+
+/// What the cubic between two depths is off by at one in between, at most.
+fn off(from: &AtDepth, to: &AtDepth, between: &AtDepth) -> f64 {
+    let [of_from, of_to, of_slope, of_slope_above] = weights(from.depth_mm, to.depth_mm, between.depth_mm);
+    let above = to.slope_above.as_ref().unwrap_or(&to.slope);
+    let difference = Waves::sum([
+        (&between.value, 1.0),
+        (&from.value, -of_from),
+        (&to.value, -of_to),
+        (&from.slope, -of_slope),
+        (above, -of_slope_above),
+    ]);
+    difference.bound()
 }
 
 /// Weights of the values and slopes at both ends, by cubic Hermite interpolation.
