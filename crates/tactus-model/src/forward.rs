@@ -234,10 +234,8 @@ impl ForwardModel {
     /// If there is not one value per element.
     pub fn respond(&self, values: &mut [f64]) {
         assert_eq!(values.len(), self.array.elements(), "one value per element");
-        let Response { sensitivity_counts_per_mm, baseline_counts, quadratic_per_mm, .. } = &self.response;
-        let parameters = sensitivity_counts_per_mm.iter().zip(baseline_counts).zip(quadratic_per_mm);
-        for (value, ((sensitivity, baseline), quadratic)) in values.iter_mut().zip(parameters) {
-            *value = baseline + sensitivity * (*value + quadratic * *value * *value);
+        for (element, value) in values.iter_mut().enumerate() {
+            *value = self.response.counts(element, *value);
         }
     }
 
@@ -258,6 +256,17 @@ impl Response {
             reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
             reference_covering: Covering { thickness_mm: 1.016 },
         }
+    }
+
+    /// Counts of an element under an equivalent indentation, before noise, saturation and quantisation.
+    ///
+    /// # Panics
+    /// If there is no such element.
+    pub fn counts(&self, element: usize, indentation_mm: f64) -> f64 {
+        let (sensitivity, quadratic) =
+            (self.sensitivity_counts_per_mm[element], self.quadratic_per_mm[element]);
+        self.baseline_counts[element]
+            + sensitivity * (indentation_mm + quadratic * indentation_mm * indentation_mm)
     }
 
     fn check(&self, elements: usize) -> Result<(), ModelError> {

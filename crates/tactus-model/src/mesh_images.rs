@@ -155,17 +155,10 @@ impl MeshImages {
                 return false;
             }
         }
-        let response = model.response();
-        let elements = response
-            .sensitivity_counts_per_mm
-            .iter()
-            .zip(&response.baseline_counts)
-            .zip(&response.quadratic_per_mm);
         let signals = self.signal.chunks_exact(columns.width).take(rows.count);
         let signals = signals.flat_map(|row| &row[..columns.count]);
-        for ((count, u), ((sensitivity, baseline), quadratic)) in counts.iter_mut().zip(signals).zip(elements)
-        {
-            *count = single(baseline + sensitivity * (u + quadratic * u * u));
+        for ((element, count), u) in counts.iter_mut().enumerate().zip(signals) {
+            *count = single(model.response().counts(element, *u));
         }
         true
     }
@@ -316,16 +309,10 @@ impl Integral<'_> {
     /// Computes the integrals up to the middle.
     #[inline(always)]
     fn start_in_middle<S: Simd>(&mut self, simd: S) {
-        let (line, dx) = self.tables.columns.near(self.middle_mm);
-        let (line, width) = (S::as_simd_f64s(line).0, S::as_simd_f64s(line).0.len() / ORDERS);
-        let [all, half, third, quarter] =
-            [dx, dx / 2.0, dx / 3.0, dx / 4.0].map(|part| simd.splat_f64s(part));
-        let plus = |a: S::f64s, b: S::f64s, x: S::f64s| simd.mul_add_e_f64s(b, x, a);
-        let (once, twice) = S::as_mut_simd_f64s(self.to_middle).0.split_at_mut(width);
+        let up_to = Series::near(simd, &self.tables.columns, self.middle_mm);
+        let (once, twice) = S::as_mut_simd_f64s(self.to_middle).0.split_at_mut(up_to.width);
         for (place, (once, twice)) in once.iter_mut().zip(twice).enumerate() {
-            let at = |derivative: usize| line[derivative * width + place];
-            *once = plus(at(1), plus(at(2), plus(at(3), at(4), third), half), all);
-            *twice = plus(at(0), plus(at(1), plus(at(2), plus(at(3), at(4), quarter), third), half), all);
+            (*once, *twice) = (up_to.slope(place), up_to.value(place));
         }
     }
 
@@ -334,36 +321,24 @@ impl Integral<'_> {
     fn add<S: Simd>(&mut self, simd: S, [x, y]: [f64; 2], once: f64, twice: f64) {
         let Self { tables: Tables { columns, rows, .. }, signal, to_middle, of_cols, of_rows, .. } = self;
         let wide = |number: f64| simd.splat_f64s(number);
-        // `a + b x`.
-        let plus = |a: S::f64s, b: S::f64s, x: S::f64s| simd.mul_add_e_f64s(b, x, a);
-        let parts = |line: &[f64]| S::as_simd_f64s(line).0.len() / ORDERS;
 
-        let (line, dx) = columns.near(x);
-        let (line, width) = (S::as_simd_f64s(line).0, parts(line));
-        let [all, half, third, quarter] = [dx, dx / 2.0, dx / 3.0, dx / 4.0].map(wide);
+        let up_to = Series::near(simd, columns, x);
         let (of_cols, _) = S::as_mut_simd_f64s(of_cols);
-        let (once_to_middle, twice_to_middle) = S::as_simd_f64s(to_middle).0.split_at(width);
+        let (once_to_middle, twice_to_middle) = S::as_simd_f64s(to_middle).0.split_at(up_to.width);
         let (first_weight, second_weight, back) = (wide(once), wide(twice), wide(self.middle_mm - x));
         for (place, of_col) in of_cols.iter_mut().enumerate() {
-            let at = |derivative: usize| line[derivative * width + place];
-            let (share, slope, bend) = (at(2), at(3), at(4));
-            let up_to = plus(at(1), plus(share, plus(slope, bend, third), half), all);
-            *of_col = simd.mul_f64s(first_weight, simd.sub_f64s(up_to, once_to_middle[place]));
+            let from_middle = simd.sub_f64s(up_to.slope(place), once_to_middle[place]);
+            *of_col = simd.mul_f64s(first_weight, from_middle);
             if twice != 0.0 {
-                let curved = plus(share, plus(slope, bend, quarter), third);
-                let twice_up_to = plus(at(0), plus(at(1), curved, half), all);
-                let from_middle = simd.sub_f64s(twice_up_to, twice_to_middle[place]);
-                *of_col = plus(*of_col, second_weight, plus(from_middle, once_to_middle[place], back));
+                let from_middle = simd.sub_f64s(up_to.value(place), twice_to_middle[place]);
+                let straight = simd.mul_add_e_f64s(once_to_middle[place], back, from_middle);
+                *of_col = simd.mul_add_e_f64s(second_weight, straight, *of_col);
             }
         }
 
-        let (line, dy) = rows.near(y);
-        let (line, width) = (S::as_simd_f64s(line).0, parts(line));
-        let [all, half, third, quarter] = [dy, dy / 2.0, dy / 3.0, dy / 4.0].map(wide);
+        let share = Series::near(simd, rows, y);
         for (place, of_row) in S::as_mut_simd_f64s(of_rows).0.iter_mut().enumerate() {
-            let at = |derivative: usize| line[derivative * width + place];
-            let curved = plus(at(2), plus(at(3), at(4), quarter), third);
-            *of_row = plus(at(0), plus(at(1), curved, half), all);
+            *of_row = share.value(place);
         }
 
         let (signal, _) = S::as_mut_simd_f64s(signal);
@@ -373,9 +348,57 @@ impl Integral<'_> {
             }
             let of_row = wide(*of_row);
             for (element, of_col) in row.iter_mut().zip(of_cols.iter()) {
-                *element = plus(*element, of_row, *of_col);
+                *element = simd.mul_add_e_f64s(of_row, *of_col, *element);
             }
         }
+    }
+}
+
+/// The Taylor series of a table's functions about the line nearest to a place.
+struct Series<'a, S: Simd> {
+    simd: S,
+    /// The line, derivative by derivative, and how many registers each takes.
+    line: &'a [S::f64s],
+    width: usize,
+    /// How far the place is beyond the line, divided by 1, 2, 3 and 4.
+    beyond: [S::f64s; 4],
+}
+
+impl<'a, S: Simd> Series<'a, S> {
+    #[inline(always)]
+    fn near(simd: S, table: &'a Table, at_mm: f64) -> Self {
+        let (line, beyond_mm) = table.near(at_mm);
+        let (line, _) = S::as_simd_f64s(line);
+        let beyond = [1.0, 2.0, 3.0, 4.0].map(|order| simd.splat_f64s(beyond_mm / order));
+        Self { simd, line, width: line.len() / ORDERS, beyond }
+    }
+
+    /// The functions there.
+    #[inline(always)]
+    fn value(&self, place: usize) -> S::f64s {
+        let [all, half, third, quarter] = self.beyond;
+        let [value, slope, second, third_slope, fourth] = self.derivatives(place);
+        let rest = self.plus(second, self.plus(third_slope, fourth, quarter), third);
+        self.plus(value, self.plus(slope, rest, half), all)
+    }
+
+    /// Their first derivatives there.
+    #[inline(always)]
+    fn slope(&self, place: usize) -> S::f64s {
+        let [all, half, third, _] = self.beyond;
+        let [_, slope, second, third_slope, fourth] = self.derivatives(place);
+        self.plus(slope, self.plus(second, self.plus(third_slope, fourth, third), half), all)
+    }
+
+    #[inline(always)]
+    fn derivatives(&self, place: usize) -> [S::f64s; ORDERS] {
+        std::array::from_fn(|derivative| self.line[derivative * self.width + place])
+    }
+
+    /// `a + b x`.
+    #[inline(always)]
+    fn plus(&self, a: S::f64s, b: S::f64s, x: S::f64s) -> S::f64s {
+        self.simd.mul_add_e_f64s(b, x, a)
     }
 }
 

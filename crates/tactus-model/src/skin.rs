@@ -275,10 +275,10 @@ fn reaches([from, to]: [[f64; 3]; 2], [a, b, c]: [[f64; 3]; 3], touch_mm: f64) -
 
 /// Whether a point lies in a triangle, or as close to it as `touch_mm`.
 fn is_within(point: [f64; 2], [p, q, r]: [[f64; 2]; 3], touch_mm: f64) -> bool {
-    let sign = turn(p, q, r).signum();
+    let sign = turn(&p, &q, &r).signum();
     [[p, q], [q, r], [r, p]].iter().all(|[from, to]| {
         let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-        sign * turn(*from, *to, point) >= -touch_mm * length
+        sign * turn(from, to, &point) >= -touch_mm * length
     })
 }
 
@@ -287,11 +287,14 @@ fn cross_each_other([a, b]: [[f64; 2]; 2], [c, d]: [[f64; 2]; 2]) -> bool {
     let overlap = |axis: usize| {
         a[axis].max(b[axis]) >= c[axis].min(d[axis]) && c[axis].max(d[axis]) >= a[axis].min(b[axis])
     };
-    overlap(0) && overlap(1) && turn(a, b, c) * turn(a, b, d) <= 0.0 && turn(c, d, a) * turn(c, d, b) <= 0.0
+    overlap(0)
+        && overlap(1)
+        && turn(&a, &b, &c) * turn(&a, &b, &d) <= 0.0
+        && turn(&c, &d, &a) * turn(&c, &d, &b) <= 0.0
 }
 
-/// Twice the area of three points in a plane, positive if they turn left.
-fn turn(p: [f64; 2], q: [f64; 2], r: [f64; 2]) -> f64 {
+/// Twice the area of three points seen along z, positive if they turn left.
+pub(crate) fn turn<const N: usize>(p: &[f64; N], q: &[f64; N], r: &[f64; N]) -> f64 {
     (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 }
 

@@ -273,14 +273,8 @@ impl Renderer {
     /// Counts from `u_e`, as [`ForwardModel::respond`] makes them.
     fn respond(&self, values: &mut [f32]) {
         let response = self.model.response();
-        let parameters = response
-            .sensitivity_counts_per_mm
-            .iter()
-            .zip(&response.baseline_counts)
-            .zip(&response.quadratic_per_mm);
-        for (value, ((sensitivity, baseline), quadratic)) in values.iter_mut().zip(parameters) {
-            let u = f64::from(*value);
-            *value = single(baseline + sensitivity * (u + quadratic * u * u));
+        for (element, value) in values.iter_mut().enumerate() {
+            *value = single(response.counts(element, f64::from(*value)));
         }
     }
 }

@@ -5,10 +5,30 @@ use rand_chacha::ChaCha8Rng;
 use tactus_model::Effect;
 
 use super::*;
-use crate::fit::Prepared;
+use crate::fit::{Prepared, Problem};
 use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
 use crate::progress::{Progress, Reporter};
 use crate::search::{Candidate, Memory};
+
+/// A search without known terms.
+fn search<'a>(
+    problem: &'a Problem<'a>,
+    candidates: &'a [Candidate],
+    work_most: u64,
+    reporter: &'a Reporter<'a>,
+) -> Search<'a> {
+    Search {
+        problem,
+        candidates,
+        options: OPTIONS,
+        known_terms: 0,
+        rounds: false,
+        may_be_rounding: false,
+        work_most,
+        memory: Memory::default(),
+        reporter,
+    }
+}
 
 #[test]
 fn names_that_have_held_their_place_are_not_judged_again() {
@@ -26,17 +46,8 @@ fn names_that_have_held_their_place_are_not_judged_again() {
             *compared.lock().unwrap() += 1;
         }
     };
-    let search = Search {
-        problem: &problem,
-        candidates: &candidates,
-        options: OPTIONS,
-        known_terms: 0,
-        rounds: false,
-        may_be_rounding: false,
-        work_most: u64::MAX,
-        memory: Memory::default(),
-        reporter: &Reporter::new(&see),
-    };
+    let reporter = Reporter::new(&see);
+    let search = search(&problem, &candidates, u64::MAX, &reporter);
     let mut grown = search.grow(&prepared.base).unwrap();
     assert_eq!(search.sorted_names(&grown.at), ["hardening"]);
     let held = grown.at.parameters.clone();
@@ -73,17 +84,9 @@ fn a_search_that_has_done_as_much_as_it_may_takes_nothing_more_and_says_so() {
         // Each has counted its own work.
         let problem = prepared.problem();
         let candidates = Candidate::all(&problem, &prepared.base, &[]).unwrap();
-        let search = Search {
-            problem: &problem,
-            candidates: &candidates,
-            options: OPTIONS,
-            known_terms: 0,
-            rounds: false,
-            may_be_rounding: false,
-            work_most: problem.predictor.work() + more_work,
-            memory: Memory::default(),
-            reporter: &Reporter::new(&|_| {}),
-        };
+        let work_most = problem.predictor.work() + more_work;
+        let reporter = Reporter::new(&|_| {});
+        let search = search(&problem, &candidates, work_most, &reporter);
         let grown = search.grow(&prepared.base).unwrap();
         (search.sorted_names(&grown.at), grown.is_cut)
     };

@@ -9,6 +9,7 @@
 use super::{Cut, Line, Slice, stack};
 use crate::Mesh;
 use crate::quadrature::smooth;
+use crate::skin::turn;
 
 /// Corners of a triangle below the surface: x, y and how far below, sensor frame.
 type Facet = [[f64; 3]; 3];
@@ -72,7 +73,7 @@ fn facets(mesh: &Mesh, [x, y]: [f64; 2], rotation_deg: f64, depth_mm: f64, lean:
 }
 
 /// The part of a triangle below the surface: three or four corners, or none.
-fn below_surface(facet: Facet) -> Vec<[f64; 3]> {
+pub(super) fn below_surface(facet: Facet) -> Vec<[f64; 3]> {
     let mut polygon = Vec::with_capacity(4);
     for (corner, next) in [(0, 1), (1, 2), (2, 0)].map(|(one, other)| (facet[one], facet[other])) {
         if corner[2] > 0.0 {
@@ -119,11 +120,6 @@ fn crossing_x([a, b]: &[[f64; 3]; 2], [c, d]: &[[f64; 3]; 2]) -> Option<f64> {
     let (of_c, of_d) = (turn(a, b, c), turn(a, b, d));
     let (of_a, of_b) = (turn(c, d, a), turn(c, d, b));
     (of_c * of_d < 0.0 && of_a * of_b < 0.0).then(|| c[0] + (d[0] - c[0]) * of_c / (of_c - of_d))
-}
-
-/// Twice the area, seen from below, that two points span with a third; its sign says on which side that lies.
-fn turn(from: &[f64; 3], to: &[f64; 3], point: &[f64; 3]) -> f64 {
-    (to[0] - from[0]) * (point[1] - from[1]) - (to[1] - from[1]) * (point[0] - from[0])
 }
 
 fn overlaps(facet: &Facet, [from, to]: [f64; 2]) -> bool {

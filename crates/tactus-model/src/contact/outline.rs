@@ -1,9 +1,10 @@
 //! The outline of what a mesh presses: its image as integrals along edges.
 
+use super::mesh::below_surface;
 use super::{Contact, Cut};
 use crate::Indenter;
 use crate::quadrature::smooth;
-use crate::skin::{Seam, Skin};
+use crate::skin::{Seam, Skin, turn};
 
 /// A straight part of the border of what is pressed, or of the border between two faces. Sensor frame; what is pressed, or the
 /// first face, is at its left hand, seen from above.
@@ -220,21 +221,6 @@ fn at_surface(below: [f64; 3], above: [f64; 3]) -> [f64; 3] {
     [along(0), along(1), 0.0]
 }
 
-/// The part of a triangle below the surface.
-fn below_surface(corners: [[f64; 3]; 3]) -> Vec<[f64; 3]> {
-    let [a, b, c] = corners;
-    let mut polygon = Vec::with_capacity(4);
-    for (corner, next) in [(a, b), (b, c), (c, a)] {
-        if corner[2] > 0.0 {
-            polygon.push(corner);
-        }
-        if (corner[2] > 0.0) != (next[2] > 0.0) {
-            polygon.push(if corner[2] > 0.0 { at_surface(corner, next) } else { at_surface(next, corner) });
-        }
-    }
-    polygon
-}
-
 /// Takes off what is hidden. A line upwards comes into the tool, leaves it through one of the `backs`, and where it then comes into it
 /// again through one of the faces that are `seen`, that face is hidden. `None` if that happens twice on a line.
 fn take_off_hidden(backs: &[Vec<[f64; 3]>], seen: &[Vec<[f64; 3]>], edges: &mut Outline) -> Option<()> {
@@ -289,11 +275,6 @@ fn centre<const N: usize>(polygon: &[[f64; N]]) -> Option<[f64; 2]> {
         }
     }
     (area.abs() > 2.0 * AREA_MIN_MM2).then(|| middle.map(|sum| sum / area))
-}
-
-/// Twice the area of three points seen from above, positive if they turn left.
-fn turn<const N: usize>(p: &[f64; N], q: &[f64; N], r: &[f64; N]) -> f64 {
-    (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 }
 
 /// Depth of a polygon's plane at the origin, and how it grows with x and y.

@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use pulp::NullaryFnOnce;
+use pulp::{Arch, NullaryFnOnce};
 
 use crate::contact::{Cut, Pressed, Slice};
 use crate::quadrature::whole;
@@ -131,7 +131,7 @@ impl Basis {
         let of_turn = |shares: &Vec<f64>| {
             let part = |part: &[f64]| part.iter().zip(shares).map(|(part, share)| part * share).collect();
             let mut values = vec![0.0; self.nodes * self.nodes];
-            with_wide_registers(AtNodes { basis: self, parts: [part(re), part(im)], values: &mut values });
+            Arch::new().dispatch(AtNodes { basis: self, parts: [part(re), part(im)], values: &mut values });
             values
         };
         self.integrated.iter().map(of_turn).collect()
@@ -217,7 +217,7 @@ impl Products {
     }
 
     fn add_to(&self, parts: &mut [Vec<f64>; 2]) {
-        with_wide_registers(Add { products: self, parts });
+        Arch::new().dispatch(Add { products: self, parts });
     }
 }
 
@@ -312,15 +312,6 @@ impl NullaryFnOnce for AtNodes<'_> {
             }
         }
     }
-}
-
-/// Runs work with the widest registers of this processor.
-fn with_wide_registers(work: impl NullaryFnOnce<Output = ()>) {
-    #[cfg(target_arch = "x86_64")]
-    if let Some(wide) = pulp::x86::V3::try_new() {
-        return wide.vectorize(work);
-    }
-    work.call();
 }
 
 fn times([a, b]: Complex, [c, d]: Complex) -> Complex {
