@@ -39,18 +39,26 @@ pub(crate) fn known() -> Known {
     }
 }
 
+/// Phase and depth at a frame of a press.
+type Way = fn(usize) -> (Phase, f64);
+
+/// A press between rests well above the surface.
+fn press(within: usize) -> (Phase, f64) {
+    match within {
+        5..10 => (Phase::Load, 0.1 * (within - 4) as f64),
+        10..20 => (Phase::Hold, 0.5),
+        20..25 => (Phase::Unload, 0.5 - 0.1 * (within - 19) as f64),
+        _ => (Phase::Idle, -2.0),
+    }
+}
+
 /// Presses of 3 s on all elements, in an order unrelated to place, with given counts.
-fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
+fn frames(known: &Known, way: Way, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
     let mut frames = Frames::new(ELEMENTS);
     for (frame, t_ns) in (0..30 * ELEMENTS).zip((0..).step_by(100_000_000)) {
         let (press, within) = (frame / 30, frame % 30);
         let [x, y] = known.array.centre_mm(press * 29 % ELEMENTS).unwrap();
-        let (phase, depth_mm) = match within {
-            5..10 => (Phase::Load, 0.1 * (within - 4) as f64),
-            10..20 => (Phase::Hold, 0.5),
-            20..25 => (Phase::Unload, 0.5 - 0.1 * (within - 19) as f64),
-            _ => (Phase::Idle, -2.0),
-        };
+        let (phase, depth_mm) = way(within);
         let depth_mm = if press % 2 == 0 { depth_mm } else { 0.7 * depth_mm };
         #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
         let counts: Vec<f32> = counts(frame).into_iter().map(|counts| counts as f32).collect();
@@ -82,9 +90,14 @@ pub(crate) fn base(known: &Known) -> BaseModel {
 
 /// The presses' frames: the prediction of a model with effects, plus `upon`, frame by frame, element by element.
 pub(crate) fn measured(known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
-    let blank = frames(known, |_| vec![0.0; ELEMENTS]);
+    measured_along(press, known, effects, upon)
+}
+
+/// The same of presses that go this way.
+pub(crate) fn measured_along(way: Way, known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
+    let blank = frames(known, way, |_| vec![0.0; ELEMENTS]);
     let clean = predict(known, &blank, &base(known), effects).unwrap();
-    frames(known, |frame| {
+    frames(known, way, |frame| {
         let clean = &clean[frame * ELEMENTS..(frame + 1) * ELEMENTS];
         clean.iter().zip(&upon[frame]).map(|(clean, upon)| f64::from(*clean) + upon).collect()
     })

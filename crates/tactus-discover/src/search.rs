@@ -41,8 +41,8 @@ mod wiring;
 
 pub(crate) use candidates::Candidate;
 pub use contests::{Contest, Rivalry};
-pub(crate) use draft::Drafted;
 pub use draft::NoDraft;
+pub(crate) use draft::{Against, Drafted};
 pub use forms::RefutedFormula;
 pub(crate) use forms::{Formed, Refuted};
 pub(crate) use given_up::last_words;

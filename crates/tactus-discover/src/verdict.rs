@@ -7,7 +7,8 @@
 //! is measured so that the noise cancels ([`closed`]).
 //!
 //! An added effect must be confirmed ([`mod@confirmed`]): fitted presses that its parameters have not seen, by five folds, must be nearer to
-//! the model with it than to the model without. The held-out presses are opened for the figures and the verdict alone.
+//! the model with it than to the model without. The held-out presses are opened for the figures and the verdict, and to say of a name that it
+//! is only the nearest, because it closes less of the gap there than an effect closes of its own physics.
 //!
 //! What is left and significant is drafted ([`drafting`]), and names that a draft makes needless give way to it. The report is a
 //! [`Discovery`] ([`conclude()`]).

@@ -89,6 +89,8 @@ pub enum NoDraft {
     TakenUp,
     /// As an effect it gains too little.
     NoGain,
+    /// With it the model is further from the held-out presses.
+    Further,
     /// It acts where a name acts, and so little that it may be an error of the name's form.
     OfAName,
 }
@@ -102,9 +104,27 @@ impl NoDraft {
             Self::Unsteady => "different parts of the data prefer different drafts".into(),
             Self::TakenUp => "recalibration takes up most of what it would explain".into(),
             Self::NoGain => "as an effect it explains too little".into(),
+            Self::Further => "with what comes first the model is further from the held-out presses".into(),
             Self::OfAName => "it may be an error of the form of a name that acts at the same place".into(),
         }
     }
+}
+
+/// What a draft has to be better than.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Against<'a> {
+    /// Every class but those that the data refute.
+    Classes {
+        /// Those.
+        refuted: &'a [&'a str],
+    },
+    /// The nearest names, which leave much: how far their model is from the fitted presses.
+    Names {
+        /// One of them.
+        nearest: &'static str,
+        /// The cost of their model.
+        cost: f64,
+    },
 }
 
 /// The outcome of drafting.
@@ -173,13 +193,12 @@ impl Field<'_> {
 
 impl Search<'_> {
     /// Drafts what a model leaves, as an effect of this name. If what comes first is no draft, that which comes next is tried, as if the first
-    /// were not in the grammar. Classes that the data refute are no reason against it. If what comes first acts at one of the `closed` stages,
-    /// there is none.
+    /// were not in the grammar. If what comes first acts at one of the `closed` stages, there is none.
     pub(crate) fn draft(
         &self,
         at: &Fitted,
         name: &str,
-        refuted: &[&str],
+        against: Against<'_>,
         closed: &[PipelineStage],
     ) -> Result<Outcome, DiscoverError> {
         let sight = Arc::new(Sight::of(self.problem, at)?);
@@ -196,7 +215,7 @@ impl Search<'_> {
             additions: &additions,
             weighed: &weighed,
             grams: &grams,
-            classes: self.classes(at, refuted)?,
+            classes: self.classes(at, against)?,
             count: atoms.len() as f64,
         };
         let mut why = NoDraft::NoGain;
@@ -206,7 +225,7 @@ impl Search<'_> {
             if closed.contains(&carrier.stage(covariates)) {
                 return Ok(Err(NoDraft::OfAName));
             }
-            match self.drafted(at, &sight, &field, (best, ln_odds, p_value), name)? {
+            match self.drafted(at, &sight, &field, (best, ln_odds, p_value), (name, against))? {
                 Ok(found) => return Ok(Ok(found)),
                 Err(other) if nth == 0 => why = other,
                 Err(_) => (),
@@ -223,7 +242,7 @@ impl Search<'_> {
         sight: &Arc<Sight>,
         field: &Field<'_>,
         (best, ln_odds, p_value): (usize, f64, f64),
-        name: &str,
+        (name, against): (&str, Against<'_>),
     ) -> Result<Outcome, DiscoverError> {
         let folds = self.folds(field, best);
         if folds < FOLDS_LEAST {
@@ -231,7 +250,8 @@ impl Search<'_> {
         }
         let nearest: Vec<(&'static str, f64)> =
             field.classes.iter().map(|(class, odds)| (*class, ln_odds - odds)).collect();
-        if let Some((class, _)) = nearest.first().filter(|(_, behind)| *behind < AHEAD_LN_ODDS) {
+        let as_near = nearest.first().filter(|(_, behind)| *behind < AHEAD_LN_ODDS);
+        if let (Some((class, _)), Against::Classes { .. }) = (as_near, against) {
             return Ok(Err(NoDraft::Class(class)));
         }
         let atom = self.with_second(at, sight, &field.weighed[best].atom, ln_odds, field.count)?;
@@ -239,6 +259,11 @@ impl Search<'_> {
         else {
             return Ok(Err(NoDraft::NoGain));
         };
+        if let Against::Names { nearest, cost } = against
+            && with.cost >= cost
+        {
+            return Ok(Err(NoDraft::Class(nearest)));
+        }
         if self.own_share(at, &with)? < OWN_LEAST {
             return Ok(Err(NoDraft::TakenUp));
         }
@@ -358,13 +383,15 @@ impl Search<'_> {
         (0..FOLDS).filter(first_in).count()
     }
 
-    /// The classes whose first step comes nearest, with the logarithm of their odds, of those that are not refuted.
-    fn classes(&self, at: &Fitted, refuted: &[&str]) -> Result<Vec<(&'static str, f64)>, DiscoverError> {
+    /// The classes whose first step comes nearest, with the logarithm of their odds, but those that are refuted.
+    fn classes(&self, at: &Fitted, against: Against<'_>) -> Result<Vec<(&'static str, f64)>, DiscoverError> {
         let pass = self.pass(at)?;
         let evidence = pass.evidence();
         let best = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), f64::NEG_INFINITY);
         let of = |(addition, gain): &(usize, Gain)| (pass.class_of(*addition), gain.ln_odds.max(0.0));
-        Ok(best.iter().map(of).filter(|(class, _)| !refuted.contains(class)).take(3).collect())
+        let is_refuted =
+            |class: &str| matches!(against, Against::Classes { refuted } if refuted.contains(&class));
+        Ok(best.iter().map(of).filter(|(class, _)| !is_refuted(class)).take(3).collect())
     }
 
     /// The atom with a second covariate, if one gains more than a form is excused for; else as it is.

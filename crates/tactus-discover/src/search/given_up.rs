@@ -1,7 +1,7 @@
 //! Effects that were fitted and are not in the grown model, and why.
 
 /// An effect that was fitted, and that the grown model does not have.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct GivenUp {
     /// Its name.
     pub effect: &'static str,
@@ -10,7 +10,7 @@ pub struct GivenUp {
 }
 
 /// Why an effect was given up.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Because {
     /// A rival without a name explains more in its place: on what the rival depends.
     Rival(&'static str),
@@ -24,6 +24,8 @@ pub enum Because {
     Unconfirmed,
     /// What is drafted without it explains as much.
     Draft,
+    /// It closes this share of the gap without it on held-out presses, and an effect closes more of its own physics.
+    Far(f64),
 }
 
 impl GivenUp {
@@ -31,7 +33,11 @@ impl GivenUp {
     /// confirm it.
     pub(crate) const fn is_refuted(&self) -> bool {
         match self.because {
-            Because::Rival(_) | Because::NearestForm(_) | Because::Unconfirmed | Because::Draft => true,
+            Because::Rival(_)
+            | Because::NearestForm(_)
+            | Because::Unconfirmed
+            | Because::Draft
+            | Because::Far(_) => true,
             Because::Little | Because::Other(_) => false,
         }
     }
@@ -49,6 +55,10 @@ impl GivenUp {
             Because::Other(other) => format!("{other} explains more in its place"),
             Because::Unconfirmed => "presses or elements that its fit has not seen do not confirm it".into(),
             Because::Draft => "what is drafted without it explains as much".into(),
+            Because::Far(share) => format!(
+                "it comes nearest, and closes {:.0} % of the gap on held-out presses: an effect closes more of its own physics",
+                100.0 * share
+            ),
         }
     }
 }

@@ -11,6 +11,9 @@
 //!
 //! The second model's numbers have errors, as those of the truth would have: what these leave is known from the fit, and no part of `L`.
 //!
+//! What is random from frame to frame, such as a clock that jitters, counts as left, and no model of a mean can close it. So the most that another
+//! model may close is a share of its own, in which only what lasts is left.
+//!
 //! A gap far below the noise is measured by this far better than by mean squares less that of the noise: of these the noise's own error may be
 //! as large as the gap. The standard error is that of a jackknife over presses.
 
@@ -24,7 +27,12 @@ pub struct Closed {
     pub share: f64,
     /// Its standard error, from the scatter of presses; `None` of fewer than three.
     pub standard_error: Option<f64>,
+    /// The share if only what lasts is left, and [`MOST_ERRORS`] of its standard errors; infinite of fewer than three presses.
+    pub most: f64,
 }
+
+/// Standard errors from a share to the most that it may be.
+const MOST_ERRORS: f64 = 2.0;
 
 /// Sums over a press: of what is closed, of what lasts in the second residual, and of its squares less the noise's.
 type OfPress = [Sums; 3];
@@ -45,18 +53,26 @@ pub(super) fn closed(
     let squares: Vec<Sums> = presses.iter().map(|of| of[2]).filter(|[_, count]| *count > 0.0).collect();
     let (left, error) = jackknife(&squares)?;
     let certain = left - student_95(squares.len()) * after.with_noise(left, error);
-    let share = |of: &[OfPress]| -> Option<f64> {
+    let share = |of: &[OfPress], least_left: f64| -> Option<f64> {
         let mean = |which: usize| -> f64 {
             let [sum, count] = of.iter().fold([0.0; 2], |sums, of| [0, 1].map(|k| sums[k] + of[which][k]));
             if count > 0.0 { sum / count } else { 0.0 }
         };
-        let (explained, left) = (mean(0), (mean(1).max(certain) - of_estimates).max(0.0));
+        let (explained, left) = (mean(0), (mean(1).max(least_left) - of_estimates).max(0.0));
         let all = explained + left;
         (all > 0.0).then(|| explained / all)
     };
-    let whole = share(&presses)?;
+    let (whole, standard_error) = with_error(&presses, |of| share(of, certain))?;
+    let (of_lasting, error) = with_error(&presses, |of| share(of, 0.0))?;
+    let most = of_lasting + MOST_ERRORS * error.unwrap_or(f64::INFINITY);
+    Some(Closed { share: whole, standard_error, most })
+}
+
+/// A share of all presses, and its standard error.
+fn with_error(presses: &[OfPress], share: impl Fn(&[OfPress]) -> Option<f64>) -> Option<(f64, Option<f64>)> {
+    let whole = share(presses)?;
     let without = |press: usize| {
-        let mut others = presses.clone();
+        let mut others = presses.to_vec();
         others.remove(press);
         share(&others)
     };
@@ -67,7 +83,7 @@ pub(super) fn closed(
         let spread: f64 = parts.iter().map(|one| (one - mean).powi(2)).sum();
         (spread * (count - 1.0) / count).sqrt()
     });
-    Some(Closed { share: whole, standard_error })
+    Some((whole, standard_error))
 }
 
 #[cfg(test)]

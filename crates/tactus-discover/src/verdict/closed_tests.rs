@@ -55,7 +55,7 @@ fn seen(residuals: &[Vec<f32>; 2], noise: f64) -> Closed {
 fn the_share_of_a_gap_far_below_the_noise_is_seen_though_the_size_of_the_noise_is_not_exact() {
     for (closes, seed) in [(1.0, 1), (0.8, 2), (0.5, 3), (0.2, 4)] {
         for noise in [0.98, 1.0, 1.02] {
-            let Closed { share, standard_error } = seen(&residuals(0.2, closes, seed), noise);
+            let Closed { share, standard_error, .. } = seen(&residuals(0.2, closes, seed), noise);
             let error = standard_error.unwrap();
             assert!((share - closes).abs() < (4.0 * error).max(0.12), "{closes} {noise}: {share} +- {error}");
             assert!(error < 0.2, "{closes} {noise}: {error}");
@@ -70,6 +70,17 @@ fn what_changes_too_fast_to_last_counts_once_it_is_certain() {
     for (place, value) in after.iter_mut().enumerate() {
         *value += if (place / ELEMENTS).is_multiple_of(2) { 2.0 } else { -2.0 };
     }
-    let Closed { share, .. } = seen(&[before, after], 1.0);
+    let Closed { share, most, .. } = seen(&[before, after], 1.0);
     assert!(share < 0.6, "{share}");
+    assert!(most >= 1.0, "nothing of it lasts: {most}");
+}
+
+#[test]
+fn the_most_that_a_model_may_close_is_less_than_it_leaves_room_for() {
+    for (closes, seed) in [(0.8, 6), (0.5, 7), (0.2, 8)] {
+        let Closed { share, standard_error, most } = seen(&residuals(2.0, closes, seed), 1.0);
+        let error = standard_error.unwrap();
+        assert!((most - share - 2.0 * error).abs() < error, "{closes}: {share} +- {error}, at most {most}");
+        assert!(most < closes + 5.0 * error && most > closes, "{closes}: {most}");
+    }
 }

@@ -9,7 +9,7 @@ use super::held_out::HeldOutResidual;
 use crate::data::{DiscoverError, Floor};
 use crate::fit::{Fitted, Prepared, Term};
 use crate::next::DraftModel;
-use crate::search::{ALPHA, Drafted, FLIPS, GivenUp, NoDraft, POLISH_ROUNDS, Rule, Search, sign_flip_p};
+use crate::search::{ALPHA, Against, Drafted, FLIPS, NoDraft, POLISH_ROUNDS, Rule, Search, sign_flip_p};
 
 /// A draft that closes less of what was left on held-out presses is partial.
 const CLOSED_LEAST: f64 = 0.7;
@@ -73,7 +73,8 @@ pub(super) struct Leaves<'a> {
     pub(super) is_left: bool,
     pub(super) grown: &'a Fitted,
     pub(super) of_grown: &'a HeldOutResidual,
-    pub(super) given_up: &'a [GivenUp],
+    /// What a draft has to be better than.
+    pub(super) against: Against<'a>,
 }
 
 /// Drafts what a grown model leaves, if that is anything. What is left may be too little for the verdict and still be seen.
@@ -83,7 +84,7 @@ pub(super) fn drafted(
     leaves: &Leaves<'_>,
     floor: Floor,
 ) -> Result<Drafting, DiscoverError> {
-    let Leaves { verdict, is_left, grown, of_grown, given_up } = *leaves;
+    let Leaves { verdict, is_left, grown, of_grown, against } = *leaves;
     let is_open = match verdict {
         Verdict::Unexplained | Verdict::PartlyExplained => true,
         Verdict::Explained => is_left,
@@ -92,7 +93,6 @@ pub(super) fn drafted(
     if !is_open || search.options.rule != Rule::Protocol {
         return Ok(Drafting::default());
     }
-    let refuted: Vec<&str> = given_up.iter().filter(|one| one.is_refuted()).map(|one| one.effect).collect();
     let known = &prepared.known.effects;
     let is_known = |name: &str| {
         known.iter().any(|effect| effect.name() == name)
@@ -108,7 +108,7 @@ pub(super) fn drafted(
         let added = grown.parameters.terms.iter().skip(search.known_terms);
         closed.extend(added.map(|term| term.definition.stage()));
     }
-    let found = match search.draft(grown, &name, &refuted, &closed)? {
+    let found = match search.draft(grown, &name, against, &closed)? {
         Ok(found) => *found,
         // Names explain all that matters, and nothing describes the rest better.
         Err(_) if verdict == Verdict::Explained => return Ok(Drafting::default()),
@@ -124,6 +124,10 @@ pub(super) fn drafted(
     }
     let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest, alike } = found;
     let of_draft = prepared.held(&at.parameters)?;
+    let closed = prepared.closed([of_grown, &of_draft], &at, floor)?;
+    if closed.is_some_and(|closed| closed.most < 0.0) {
+        return Ok(Drafting { draft: Some(Err(NoDraft::Further)), ..Drafting::default() });
+    }
     let model = at.parameters.terms.last().map(|term| DraftModel {
         name: term.definition.name,
         with: at.parameters.clone(),
@@ -138,7 +142,7 @@ pub(super) fn drafted(
         folds,
         nearest,
         alike,
-        closed: prepared.closed([of_grown, &of_draft], &at, floor)?,
+        closed,
         heldout_rms_before_counts: of_grown.rms_counts,
         heldout_rms_after_counts: of_draft.rms_counts,
         base: super::conclude::base_of(prepared, &at.parameters),

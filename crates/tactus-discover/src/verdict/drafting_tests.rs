@@ -5,8 +5,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tactus_model::effect::{Carrier, PipelineStage, When};
 use tactus_model::{Covariate, Effect};
+use tactus_schema::table::Phase;
 
-use crate::fixtures::{ELEMENTS, found, known, measured, processes};
+use crate::fixtures::{ELEMENTS, found, known, measured, measured_along, processes};
 use crate::{Because, Discovery, DraftedEffect, Frames, GivenUp, Known, NoDraft, Verdict, confirm};
 
 /// Independent noise of one count, nearly white.
@@ -200,4 +201,41 @@ fn a_name_gives_way_to_what_is_drafted_without_it_and_explains_as_much() {
     assert_eq!((names(&found), found.verdict), (vec![], Verdict::Unexplained));
     let gave_way = GivenUp { effect: "heavy-tail", because: Because::Draft };
     assert!(found.given_up.contains(&gave_way), "{:?}", found.given_up);
+}
+
+/// It lets go so low that knots at equal numbers of frames would not see it.
+#[test]
+fn a_covering_that_sticks_to_the_leaving_tool_is_drafted_by_its_height() {
+    const LETS_GO_MM: f64 = 0.2;
+    let way = |within: usize| match within {
+        5..10 => (Phase::Load, 0.1 * (within - 4) as f64),
+        10..15 => (Phase::Hold, 0.5),
+        15..20 => (Phase::Unload, 0.5 - 0.1 * (within - 14) as f64),
+        20..30 => (Phase::Unload, -0.06 * (within - 19) as f64),
+        _ => (Phase::Idle, -2.0),
+    };
+    let known = known();
+    let clean = measured_along(way, &known, &[], &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
+    let mut upon = noise(11);
+    for (frame, upon) in upon.iter_mut().enumerate() {
+        let height_mm = clean.position_mm[frame][2];
+        if frame % 30 < 20 || height_mm > LETS_GO_MM {
+            continue;
+        }
+        let pressed = frame / 30 * 30 + 12;
+        let depth_mm = -clean.position_mm[pressed][2];
+        for (upon, counts) in upon.iter_mut().zip(clean.counts_of(pressed)) {
+            *upon -= height_mm / depth_mm * (f64::from(*counts) - 100.0);
+        }
+    }
+    let found = found(&known, &measured_along(way, &known, &[], &upon));
+    let drafted = drafted(&found);
+    let draft = &drafted.draft;
+    assert_eq!(
+        (draft.carrier, &*draft.covariates),
+        (Carrier::PressHere, &[Covariate::Height][..]),
+        "{draft:?}"
+    );
+    assert!(!drafted.is_partial(), "{:?}", drafted.closed);
+    assert_eq!(names(&found), [""; 0]);
 }

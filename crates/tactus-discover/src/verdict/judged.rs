@@ -15,11 +15,17 @@ use crate::data::{DiscoverError, Floor, MISWIRED};
 use crate::fit::Prepared;
 use crate::progress::Stage;
 use crate::search::{
-    ALPHA, Because, Contest, Equivalent, GivenUp, Left, Located, Rule, Scattered, Search, last_words, names,
+    ALPHA, Against, Because, Contest, Equivalent, GivenUp, Left, Located, Rule, Scattered, Search,
+    last_words, names,
 };
 
 /// Upper bound of what is structured, in noise units, for the verdict `Explained` whatever the tests say.
 const LITTLE_NOISE: f64 = 0.5;
+
+/// An effect closes so much of the gap that its own physics makes, whatever its form. A name that closes less at most is only the nearest.
+const NEAR_CLOSES: f64 = 0.85;
+/// The same where what is left is too little to matter: it may be errors that are as small.
+const EXPLAINED_CLOSES: f64 = 0.5;
 
 /// Judges grown models beside the base model.
 pub(super) struct Judge<'a> {
@@ -60,11 +66,46 @@ pub(super) struct Judged {
 impl Judge<'_> {
     /// Judges a model without the names that give way to a draft.
     pub(super) fn judged(&self, confirmed: Confirmed) -> Result<Judged, DiscoverError> {
-        let mut judged = self.judge(confirmed, Vec::new())?;
+        let mut judged = self.judge(confirmed, Vec::new(), None)?;
         while let Some(less) = self.without_a_needless_name(&judged)? {
             judged = less;
         }
-        Ok(judged)
+        self.without_far_names(judged)
+    }
+
+    /// The model without the names that leave more of the gap than an effect leaves of its own physics. They come nearest, and are tentative; a
+    /// draft has to come nearer than they.
+    fn without_far_names(&self, judged: Judged) -> Result<Judged, DiscoverError> {
+        let is_far = |closed: Option<Closed>| closed.filter(|closed| is_far(judged.verdict, closed));
+        if is_far(judged.closed).is_none() {
+            return Ok(judged);
+        }
+        let mut far = Vec::new();
+        for name in self.named(&judged.confirmed) {
+            let less = judged.confirmed.without(&[name], self.prepared, self.search, self.equivalent)?;
+            let of_less = self.prepared.held(&less.grown.parameters)?;
+            let both = [&of_less, &judged.held];
+            let closed = self.prepared.closed(both, &judged.confirmed.grown, judged.floor)?;
+            far.extend(is_far(closed).map(|closed| (name, closed)));
+        }
+        let Some((nearest, _)) = far.first().copied() else { return Ok(judged) };
+        let Judged { confirmed, mut given_up, .. } = judged;
+        let gone: Vec<&str> = far.iter().map(|(name, _)| *name).collect();
+        let mut less = confirmed.without(&gone, self.prepared, self.search, self.equivalent)?;
+        less.tentative.extend(confirmed.steps.into_iter().filter(|step| gone.contains(&step.effect)));
+        let of_far = |(effect, Closed { share, .. })| GivenUp { effect, because: Because::Far(share) };
+        given_up.extend(far.into_iter().map(of_far));
+        let against = Against::Names { nearest, cost: confirmed.grown.cost };
+        self.judge(less, given_up, Some(against))
+    }
+
+    /// The names that may give way: a draft of the lab's library is no name that came first for want of a better one, and no draft acts like
+    /// miswired elements.
+    fn named(&self, confirmed: &Confirmed) -> Vec<&'static str> {
+        let mut names = names(&confirmed.grown.parameters, self.search.known_terms);
+        let is_draft = |name: &str| self.prepared.known.drafts.iter().any(|draft| draft.name == name);
+        names.retain(|name| *name != MISWIRED && !is_draft(name));
+        names
     }
 
     /// The model without a name, if what is drafted then acts by the same on the same, and explains as much as the name and the draft together.
@@ -72,15 +113,11 @@ impl Judge<'_> {
         let Drafting { draft: Some(Ok(beside)), at: Some(both), .. } = &judged.drafting else {
             return Ok(None);
         };
-        let mut names = names(&judged.confirmed.grown.parameters, self.search.known_terms);
-        // A draft of the lab's library is no name that came first for want of a better one, and no draft acts like miswired elements.
-        let is_draft = |name: &str| self.prepared.known.drafts.iter().any(|draft| draft.name == name);
-        names.retain(|name| *name != MISWIRED && !is_draft(name));
-        for name in names {
+        for name in self.named(&judged.confirmed) {
             let less = judged.confirmed.without(&[name], self.prepared, self.search, self.equivalent)?;
             let mut given_up = judged.given_up.clone();
             given_up.push(GivenUp { effect: name, because: Because::Draft });
-            let less = self.judge(less, given_up)?;
+            let less = self.judge(less, given_up, None)?;
             if let Drafting { draft: Some(Ok(draft)), at: Some(alone), .. } = &less.drafting
                 && draft.is_like(beside)
                 && self.search.is_needless(draft.ln_odds, [alone, both])
@@ -91,7 +128,13 @@ impl Judge<'_> {
         Ok(None)
     }
 
-    fn judge(&self, confirmed: Confirmed, gave_way: Vec<GivenUp>) -> Result<Judged, DiscoverError> {
+    /// Judges a model. Its draft has to be better than the names `against` which it stands, or than every class that the data do not refute.
+    fn judge(
+        &self,
+        confirmed: Confirmed,
+        gave_way: Vec<GivenUp>,
+        against: Option<Against<'_>>,
+    ) -> Result<Judged, DiscoverError> {
         let Self { prepared, search, of_base, .. } = *self;
         let Prepared { converter, faulty, .. } = prepared;
         let grown = &confirmed.grown;
@@ -129,7 +172,10 @@ impl Judge<'_> {
         };
         let verdict = evidence.verdict();
         let given_up = self.given_up(&confirmed, gave_way);
-        let leaves = Leaves { verdict, is_left, grown, of_grown: &held, given_up: &given_up };
+        let refuted: Vec<&str> =
+            given_up.iter().filter(|one| one.is_refuted()).map(|one| one.effect).collect();
+        let against = against.unwrap_or(Against::Classes { refuted: &refuted });
+        let leaves = Leaves { verdict, is_left, grown, of_grown: &held, against };
         let drafting = drafted(prepared, search, &leaves, floor)?;
         Ok(Judged {
             confirmed,
@@ -159,6 +205,15 @@ impl Judge<'_> {
             .chain(gave_way);
         let present: Vec<&str> = confirmed.steps.iter().map(|step| step.effect).collect();
         last_words(all.collect(), &present)
+    }
+}
+
+/// True if names that close so much are only the nearest.
+fn is_far(verdict: Verdict, closed: &Closed) -> bool {
+    match verdict {
+        Verdict::PartlyExplained => closed.most < NEAR_CLOSES,
+        Verdict::Explained => closed.most < EXPLAINED_CLOSES,
+        Verdict::Unexplained | Verdict::NothingMissing | Verdict::CannotJudge => false,
     }
 }
 

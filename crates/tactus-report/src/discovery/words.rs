@@ -1,6 +1,6 @@
 //! The verdict of a discovery in words.
 
-use tactus_discover::{Closed, Discovery, Floor, GivenUp, Verdict};
+use tactus_discover::{AddedEffect, Closed, Discovery, Floor, GivenUp, Verdict};
 
 use super::active::command;
 use super::faulty;
@@ -10,16 +10,19 @@ use crate::plot::number;
 /// An effect that was given up and would close this share of the gap is told in the verdict.
 const CLOSES_MUCH: f64 = 0.5;
 
-/// What the fitted presses show, but do not confirm where they are predicted by each other.
+/// What a fit shows and is no name, and why.
 fn tentative(found: &Discovery) -> Option<String> {
-    let names = list(found.tentative.iter().map(|step| step.effect));
-    let of = || {
-        format!(
-            "Tentative: {names}. A fit shows it, but presses that the fit has not seen do not confirm it."
-        )
+    let why = |effect: &str| {
+        let known = found.given_up.iter().rfind(|one| one.effect == effect);
+        known.map_or_else(|| UNCONFIRMED.to_owned(), GivenUp::in_words)
     };
-    (!found.tentative.is_empty()).then(of)
+    let of = |step: &AddedEffect| format!("Tentative: {}: {}.", step.effect, why(step.effect));
+    let each: Vec<String> = found.tentative.iter().map(of).collect();
+    (!each.is_empty()).then(|| each.join(" "))
 }
+
+/// Said of a tentative effect that is in the model as well.
+const UNCONFIRMED: &str = "presses that its fit has not seen do not confirm it";
 
 /// What was drafted of what no known effect explains.
 fn drafted(found: &Discovery) -> Option<String> {
@@ -178,7 +181,7 @@ pub(super) fn percent(share: f64) -> String {
 }
 
 /// Such as `83 % +- 6 %` or `99.96 % +- 0.03 %`: the error has one digit at least, and the share as many decimals.
-pub fn closed(Closed { share, standard_error }: Closed) -> String {
+pub fn closed(Closed { share, standard_error, .. }: Closed) -> String {
     let Some(error) = standard_error else { return percent(share) };
     let places = if error < 0.000_95 { 2 } else { usize::from(error < 0.0095) };
     format!("{} % +- {} %", short(100.0 * share, places), short((100.0 * error).max(0.01), places))

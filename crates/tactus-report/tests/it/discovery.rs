@@ -11,8 +11,8 @@ use crate::made_up::discovery::{
 };
 use serde_json::Value;
 use tactus_discover::{
-    Closed, Discovery, DraftedEffect, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, NoDraft,
-    RefutedFormula, Unexplained, Verdict,
+    Because, Closed, Discovery, DraftedEffect, FittedCurve, FittedKnot, GivenUp, GlobalTest, LeftOut,
+    NextExperiment, NoDraft, RefutedFormula, Unexplained, Verdict,
 };
 use tactus_model::Array;
 use tactus_model::effect::Definition;
@@ -173,7 +173,7 @@ fn a_draft_has_its_sentence_its_curve_and_what_speaks_for_it() {
     );
     assert_eq!(draft["knots"][1].to_string(), r#"{"at":2.0,"formula":-0.05,"se":0.002,"value":-0.05}"#);
 
-    let closed = Some(Closed { share: 0.4, standard_error: None });
+    let closed = Some(Closed { share: 0.4, standard_error: None, most: f64::INFINITY });
     discovery.draft = Some(Ok(Box::new(DraftedEffect { closed, ..self::draft() })));
     assert!(html(&discovery).contains("badge warn\">partial<"));
     discovery.draft = Some(Err(NoDraft::Class("hardening")));
@@ -238,7 +238,17 @@ fn what_held_out_presses_do_not_confirm_is_tentative() {
     discovery.tentative = vec![discovery.steps.remove(0)];
     let name = discovery.tentative[0].effect;
     let text = in_words(&discovery);
-    assert!(text.contains(&format!("Tentative: {name}.")), "{text}");
+    assert!(text.contains(&format!("Tentative: {name}: presses that its fit has not seen")), "{text}");
+}
+
+#[test]
+fn a_name_that_is_only_the_nearest_is_tentative_with_what_it_closes() {
+    let mut discovery = explained();
+    discovery.tentative = vec![discovery.steps.remove(0)];
+    let effect = discovery.tentative[0].effect;
+    discovery.given_up.push(GivenUp { effect, because: Because::Far(0.62) });
+    let text = in_words(&discovery);
+    assert!(text.contains(&format!("Tentative: {effect}: it comes nearest, and closes 62 %")), "{text}");
 }
 
 #[test]

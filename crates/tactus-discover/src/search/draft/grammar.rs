@@ -193,13 +193,13 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
     let mut found: Vec<Atom> = Vec::new();
     let of_all = || each(IN_CONTACT).chain(each(ELSEWHERE));
     found.extend(of_all().filter_map(|one| smooth(one, KNOTS, false)));
-    // What follows an event may be over in some frames, or swing.
+    // What follows an event may be over in some frames, or swing, and what is felt near the surface gone a little higher.
     let fine = |one: Acting| {
         let (carrier, when, covariate) = one;
         let knots = sight.fine_knots(one);
         (knots.len() > KNOTS).then(|| Atom::of(carrier, when, covariate, knots))
     };
-    found.extend(of_all().filter(|(.., covariate)| is_since_an_event(*covariate)).filter_map(fine));
+    found.extend(of_all().filter(|(.., covariate)| is_near_an_event(*covariate)).filter_map(fine));
     found.extend(each(OF_EACH).filter_map(|one| smooth(one, OF_ELEMENTS, true)));
     found.extend(each(CONSTANT).flat_map(|(carrier, when, covariate)| {
         let place = sight.knots((carrier, when, covariate), 1);
@@ -242,9 +242,12 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
     found
 }
 
-/// True of a time since something happened.
-const fn is_since_an_event(covariate: Covariate) -> bool {
-    matches!(covariate, Covariate::SinceContact | Covariate::SinceTurn | Covariate::SinceRelease)
+/// True of a time since something happened, and of a distance from where it does.
+const fn is_near_an_event(covariate: Covariate) -> bool {
+    matches!(
+        covariate,
+        Covariate::SinceContact | Covariate::SinceTurn | Covariate::SinceRelease | Covariate::Height
+    )
 }
 
 /// An atom with each other covariate that its carrier may have beside its own.

@@ -128,14 +128,19 @@ impl Sight {
         knots
     }
 
-    /// Places of knots of a curve that changes from frame to frame at first, and later more slowly.
+    /// Places of knots of a curve that changes from frame to frame at first, and later more slowly; or close to the surface, and more slowly above.
     pub(super) fn fine_knots(&self, of: Acting) -> Vec<f64> {
         let mut values = self.values(of);
         values.sort_by(f64::total_cmp);
+        let (_, _, covariate) = of;
+        let least_apart = match (covariate, values.last()) {
+            (Covariate::Height, Some(highest)) => APART_SHARE * highest,
+            // The times of two frames are not quite an interval apart.
+            _ => 0.9 * self.interval_s,
+        };
         let mut knots: Vec<f64> = Vec::new();
         for value in values {
-            // The times of two frames are not quite an interval apart.
-            let apart = |last: &f64| (0.9 * self.interval_s).max(FINE_SHARE * last);
+            let apart = |last: &f64| least_apart.max(FINE_SHARE * last);
             if knots.last().is_none_or(|last| value - last > apart(last)) {
                 knots.push(value);
             }

@@ -48,7 +48,7 @@ pub(crate) fn draft() -> DraftedEffect {
         folds: 5,
         nearest: vec![("saturation", 76.2), ("hardening", 98.0)],
         alike: vec!["depth in contact, by temperature".into()],
-        closed: Some(Closed { share: 0.93, standard_error: Some(0.04) }),
+        closed: Some(Closed { share: 0.93, standard_error: Some(0.04), most: 1.01 }),
         heldout_rms_before_counts: 3.45,
         heldout_rms_after_counts: 2.11,
         base: base(),
@@ -138,7 +138,7 @@ pub(crate) fn explained() -> Discovery {
         ],
         final_: Final {
             level: level(2.08),
-            closed: Some(Closed { share: 0.996_1, standard_error: Some(0.004) }),
+            closed: Some(Closed { share: 0.996_1, standard_error: Some(0.004), most: 1.004 }),
         },
         verdict: Verdict::Explained,
         draft: None,
@@ -255,7 +255,10 @@ pub(crate) fn unexplained() -> Discovery {
     Discovery {
         floor: Floor::Repeats { rms_counts: NOISE_COUNTS, freedom: 12.0 },
         tolerance_counts: None,
-        final_: Final { level: whole.base, closed: Some(Closed { share: 0.0, standard_error: None }) },
+        final_: Final {
+            level: whole.base,
+            closed: Some(Closed { share: 0.0, standard_error: None, most: f64::INFINITY }),
+        },
         rounds: vec![Round { taken: None, ..whole.rounds[0].clone() }],
         steps: vec![],
         tentative: vec![],

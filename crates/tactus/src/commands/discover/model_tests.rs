@@ -88,7 +88,10 @@ pub(crate) fn found(model: &Model) -> Discovery {
             curves: Vec::new(),
             equivalent: Vec::new(),
         }],
-        final_: Final { level, closed: Some(Closed { share: 1.0, standard_error: None }) },
+        final_: Final {
+            level,
+            closed: Some(Closed { share: 1.0, standard_error: None, most: f64::INFINITY }),
+        },
         verdict: Verdict::Explained,
         draft: None,
         unexplained: Unexplained { depends_on: Vec::new(), gap: Vec::new(), share: 0.0 },
