@@ -13,7 +13,7 @@
 //! # Source
 //! Frequencies of codes: IEEE Std 1241-2010, *Terminology and Test Methods for Analog-to-Digital Converters*, section 4.7.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::frames::Frames;
 use crate::numbers::upper_tail;
@@ -30,6 +30,8 @@ const GAPS_MAX: usize = 512;
 const AT_END_LEAST: usize = 10;
 /// A gap has at most this probability by chance, times the number of those looked at.
 const CHANCE: f64 = 1e-6;
+/// After that, no more crossings of a gap are counted.
+const LN_ENOUGH: f64 = -100.0;
 /// No single crossing says more than this: readings jitter in time.
 const SEEN_MOST: f64 = 0.9;
 /// The codes beside a gap that tell how frequent a code is there.
@@ -174,11 +176,12 @@ impl Frequencies {
 }
 
 /// For each gap, the logarithm of the probability that no reading is inside, had the converter those codes: of an element the first crossing in
-/// each press and in each rest between presses.
+/// each press and in each rest between presses. Crossings between the same two codes say the same where nothing dithers, and count once.
 fn ln_chances(frames: &Frames, ends: &[[f64; 2]], step_counts: f64) -> Vec<f64> {
     let elements = frames.elements;
     let mut ln_chances = vec![0.0; ends.len()];
     let mut crossed: Vec<Option<i32>> = vec![None; ends.len() * elements];
+    let mut counted = BTreeSet::new();
     let mut begin = 0;
     for (_, end) in &frames.runs {
         crossed.fill(None);
@@ -190,8 +193,11 @@ fn ln_chances(frames: &Frames, ends: &[[f64; 2]], step_counts: f64) -> Vec<f64> 
                 let first = ends.partition_point(|gap| gap[0] < low);
                 for gap in (first..ends.len()).take_while(|gap| ends[*gap][1] <= high) {
                     let last = &mut crossed[gap * elements + element];
-                    if *last != Some(press) {
-                        *last = Some(press);
+                    if *last == Some(press) || ln_chances[gap] < LN_ENOUGH {
+                        continue;
+                    }
+                    *last = Some(press);
+                    if counted.insert((gap, element, before.to_bits(), now.to_bits())) {
                         let missing = ends[gap][1] - ends[gap][0] - step_counts;
                         ln_chances[gap] += (-(missing / (high - low)).min(SEEN_MOST)).ln_1p();
                     }

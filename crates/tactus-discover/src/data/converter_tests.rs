@@ -57,6 +57,16 @@ fn few_readings_give_none() {
 /// Presses of eight elements: up to some hundred counts and back at this many counts a frame, with noise of a count and a half, read by a
 /// converter.
 fn pressed(seed: u64, presses: i32, counts_a_frame: f64, convert: impl Fn(f64) -> f64) -> Frames {
+    pressed_with_noise(seed, presses, counts_a_frame, 1.5, convert)
+}
+
+fn pressed_with_noise(
+    seed: u64,
+    presses: i32,
+    counts_a_frame: f64,
+    noise_counts: f64,
+    convert: impl Fn(f64) -> f64,
+) -> Frames {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut frames = Frames::new(8);
     let mut t_ns = 0;
@@ -70,7 +80,7 @@ fn pressed(seed: u64, presses: i32, counts_a_frame: f64, convert: impl Fn(f64) -
             let counts = tops.map(|top| {
                 let noise: f64 = StandardNormal.sample(&mut rng);
                 #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
-                let counts = convert(100.0 + top * share + 1.5 * noise).round() as f32;
+                let counts = convert(100.0 + top * share + noise_counts * noise).round() as f32;
                 counts
             });
             frames.push(row(press, t_ns, &counts));
@@ -79,6 +89,23 @@ fn pressed(seed: u64, presses: i32, counts_a_frame: f64, convert: impl Fn(f64) -
         }
     }
     frames
+}
+
+/// Each press reads the same codes as the one before: of those between them they say as much as one press.
+#[test]
+fn presses_that_repeat_each_other_exactly_are_one() {
+    for seed in 1..=8 {
+        let first = pressed_with_noise(seed, 1, 9.0, 0.0, f64::round);
+        let mut frames = Frames::new(8);
+        let mut t_ns = 0;
+        for press in 0..60 {
+            for frame in 0..first.len() {
+                frames.push(row(press, t_ns, first.counts_of(frame)));
+                t_ns += 33_000_000;
+            }
+        }
+        assert_eq!(Converter::seen(&frames, 1.0), None, "{seed}");
+    }
 }
 
 #[test]

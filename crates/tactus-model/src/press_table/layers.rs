@@ -1,5 +1,8 @@
 //! The tables inside a press table, and how they are made.
 
+use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
+use rayon::slice::ParallelSlice;
+
 use super::waves::{Basis, Grid, Waves};
 use super::{reach_mm, single};
 use crate::contact::Cut;
@@ -197,29 +200,31 @@ impl Maker<'_> {
     }
 
     fn at_depth(&self, depth_mm: f64, aside_mm: f64, jumps: bool) -> AtDepth {
-        AtDepth {
-            depth_mm,
-            value: self.waves(Cut::Penetration, depth_mm),
-            slope: self.waves(Cut::Footprint, depth_mm + aside_mm),
-            slope_above: jumps.then(|| self.waves(Cut::Footprint, depth_mm - aside_mm)),
-        }
+        let slope = |depth_mm| self.waves(Cut::Footprint, depth_mm);
+        let (value, (slope, slope_above)) = rayon::join(
+            || self.waves(Cut::Penetration, depth_mm),
+            || (slope(depth_mm + aside_mm), jumps.then(|| slope(depth_mm - aside_mm))),
+        );
+        AtDepth { depth_mm, value, slope, slope_above }
     }
 
     /// Pieces between depths.
     fn pieces(&self, ends: &[AtDepth]) -> Vec<Piece> {
-        let mut before: Option<(f64, Tables, Tables)> = None;
-        let mut pieces = Vec::with_capacity(ends.len());
-        for AtDepth { depth_mm: to_mm, value, slope, slope_above } in ends {
-            let (value, below) = (self.tables(value), self.tables(slope));
-            if let Some((from_mm, from_value, from_slope)) = before {
-                let above = slope_above.as_ref().map(|slope| self.tables(slope));
-                let above = above.as_ref().unwrap_or(&below);
-                let table = interleave(&[&from_value, &value, &from_slope, above], self.nodes);
-                pieces.push(Piece { from_mm, to_mm: *to_mm, table });
+        let tables = |of: &AtDepth| -> [Tables; 3] {
+            let below = self.tables(&of.slope);
+            let above = of.slope_above.as_ref().map_or_else(|| below.clone(), |slope| self.tables(slope));
+            [self.tables(&of.value), below, above]
+        };
+        let tables: Vec<[Tables; 3]> = ends.par_iter().map(tables).collect();
+        let piece = |(ends, tables): (&[AtDepth], &[[Tables; 3]])| {
+            let [[from_value, from_slope, _], [value, _, above]] = [&tables[0], &tables[1]];
+            Piece {
+                from_mm: ends[0].depth_mm,
+                to_mm: ends[1].depth_mm,
+                table: interleave(&[from_value, value, from_slope, above], self.nodes),
             }
-            before = Some((*to_mm, value, below));
-        }
-        pieces
+        };
+        ends.par_windows(2).zip(tables.par_windows(2)).map(piece).collect()
     }
 
     /// In units of the reference press.
