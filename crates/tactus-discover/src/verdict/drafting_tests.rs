@@ -239,3 +239,26 @@ fn a_covering_that_sticks_to_the_leaving_tool_is_drafted_by_its_height() {
     assert!(!drafted.is_partial(), "{:?}", drafted.closed);
     assert_eq!(names(&found), [""; 0]);
 }
+
+/// Each separation leaves charge at its place, which fades and is felt in later presses too. The nearest effect follows a part of that.
+#[test]
+fn a_name_that_closes_less_than_an_effect_closes_of_its_own_is_tentative() {
+    let known = known();
+    let clean = measured(&known, &[], &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
+    let mut upon = noise(11);
+    for (frame, upon) in upon.iter_mut().enumerate() {
+        let released = (0..=frame / 30).map(|press| 30 * press + 24).take_while(|released| *released < frame);
+        for released in released {
+            let fades = 0.06 * (-((frame - released) as f64) / 40.0).exp();
+            for (upon, counts) in upon.iter_mut().zip(clean.counts_of(released / 30 * 30 + 12)) {
+                *upon -= fades * (f64::from(*counts) - 100.0);
+            }
+        }
+    }
+    let found = found(&known, &measured(&known, &[], &upon));
+    let tentative: Vec<&str> = found.tentative.iter().map(|step| step.effect).collect();
+    let far = |one: &GivenUp| matches!(one.because, Because::Far(share) if share < 0.85);
+    let of_far: Vec<&str> = found.given_up.iter().filter(|one| far(one)).map(|one| one.effect).collect();
+    assert!(!of_far.is_empty() && tentative == of_far, "{tentative:?} {:?}", found.given_up);
+    assert_eq!((names(&found), found.verdict), (vec![], Verdict::Unexplained));
+}

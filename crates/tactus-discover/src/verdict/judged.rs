@@ -24,8 +24,6 @@ const LITTLE_NOISE: f64 = 0.5;
 
 /// An effect closes so much of the gap that its own physics makes, whatever its form. A name that closes less at most is only the nearest.
 const NEAR_CLOSES: f64 = 0.85;
-/// The same where what is left is too little to matter: it may be errors that are as small.
-const EXPLAINED_CLOSES: f64 = 0.5;
 
 /// Judges grown models beside the base model.
 pub(super) struct Judge<'a> {
@@ -76,8 +74,9 @@ impl Judge<'_> {
     /// The model without the names that leave more of the gap than an effect leaves of its own physics. They come nearest, and are tentative; a
     /// draft has to come nearer than they.
     fn without_far_names(&self, judged: Judged) -> Result<Judged, DiscoverError> {
-        let is_far = |closed: Option<Closed>| closed.filter(|closed| is_far(judged.verdict, closed));
-        if is_far(judged.closed).is_none() {
+        let is_far = |closed: &Closed| closed.most < NEAR_CLOSES;
+        if judged.verdict != Verdict::PartlyExplained || !judged.closed.is_some_and(|closed| is_far(&closed))
+        {
             return Ok(judged);
         }
         let mut far = Vec::new();
@@ -86,7 +85,7 @@ impl Judge<'_> {
             let of_less = self.prepared.held(&less.grown.parameters)?;
             let both = [&of_less, &judged.held];
             let closed = self.prepared.closed(both, &judged.confirmed.grown, judged.floor)?;
-            far.extend(is_far(closed).map(|closed| (name, closed)));
+            far.extend(closed.filter(is_far).map(|closed| (name, closed)));
         }
         let Some((nearest, _)) = far.first().copied() else { return Ok(judged) };
         let Judged { confirmed, mut given_up, .. } = judged;
@@ -205,15 +204,6 @@ impl Judge<'_> {
             .chain(gave_way);
         let present: Vec<&str> = confirmed.steps.iter().map(|step| step.effect).collect();
         last_words(all.collect(), &present)
-    }
-}
-
-/// True if names that close so much are only the nearest.
-fn is_far(verdict: Verdict, closed: &Closed) -> bool {
-    match verdict {
-        Verdict::PartlyExplained => closed.most < NEAR_CLOSES,
-        Verdict::Explained => closed.most < EXPLAINED_CLOSES,
-        Verdict::Unexplained | Verdict::NothingMissing | Verdict::CannotJudge => false,
     }
 }
 

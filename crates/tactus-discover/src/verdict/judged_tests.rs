@@ -46,19 +46,3 @@ fn without_names_nothing_is_missing_only_if_more_than_twice_the_noise_would_show
     assert_eq!(Evidence { upper_noise: f64::INFINITY, ..unnamed }.verdict(), Verdict::CannotJudge);
     assert_eq!(Evidence { is_missing: true, ..unnamed }.verdict(), Verdict::Unexplained);
 }
-
-#[test]
-fn names_that_leave_more_than_effects_leave_of_their_own_are_only_the_nearest() {
-    let closed = |most| Closed { share: most - 0.04, standard_error: Some(0.02), most };
-    for (verdict, most, want) in [
-        (Verdict::PartlyExplained, 0.9, false),
-        (Verdict::PartlyExplained, 0.8, true),
-        (Verdict::Explained, 0.8, false),
-        (Verdict::Explained, 0.4, true),
-        (Verdict::Explained, -0.1, true),
-        (Verdict::PartlyExplained, f64::INFINITY, false),
-        (Verdict::Unexplained, 0.1, false),
-    ] {
-        assert_eq!(is_far(verdict, &closed(most)), want, "{verdict:?} {most}");
-    }
-}
