@@ -25,6 +25,9 @@ const LITTLE_NOISE: f64 = 0.5;
 /// An effect closes so much of the gap that its own physics makes, whatever its form. A name that closes less at most is only the nearest.
 const NEAR_CLOSES: f64 = 0.85;
 
+/// Effects that go where they like between two presses.
+const DRIFTS: [&str; 2] = ["baseline-drift", "gain-drift"];
+
 /// Judges grown models beside the base model.
 pub(super) struct Judge<'a> {
     pub(super) prepared: &'a Prepared<'a>,
@@ -72,11 +75,14 @@ impl Judge<'_> {
     }
 
     /// The model without the names that leave more of the gap than an effect leaves of its own physics. They come nearest, and are tentative; a
-    /// draft has to come nearer than they.
+    /// draft has to come nearer than they. Between presses a drift goes where it likes, which no model closes, so that none
+    /// is asked beside it.
     fn without_far_names(&self, judged: Judged) -> Result<Judged, DiscoverError> {
         let is_far = |closed: &Closed| closed.most < NEAR_CLOSES;
-        if judged.verdict != Verdict::PartlyExplained || !judged.closed.is_some_and(|closed| is_far(&closed))
-        {
+        let drifts =
+            judged.confirmed.grown.parameters.terms.iter().any(|term| DRIFTS.contains(&term.definition.name));
+        let is_asked = judged.verdict == Verdict::PartlyExplained && !drifts;
+        if !is_asked || !judged.closed.is_some_and(|closed| is_far(&closed)) {
             return Ok(judged);
         }
         let mut far = Vec::new();
