@@ -201,6 +201,7 @@ async fn carry(client: TcpStream, service: TcpStream, mut state: watch::Receiver
     let (mut from_service, mut to_service) = service.into_split();
     let mut broken = state.clone();
     tokio::select! {
+        biased;
         _ = broken.wait_for(|state| *state == LinkState::Broken) => {}
         _ = tokio::io::copy(&mut from_client, &mut to_service) => {}
         () = async {
@@ -210,7 +211,11 @@ async fn carry(client: TcpStream, service: TcpStream, mut state: watch::Receiver
                     return;
                 }
                 match from_service.read(&mut bytes).await {
+                    // It may have been cut since the read began, and what came then is not passed on.
                     Ok(count) if count > 0 => {
+                        if *state.borrow() == LinkState::Broken {
+                            return;
+                        }
                         if to_client.write_all(&bytes[..count]).await.is_err() {
                             return;
                         }
