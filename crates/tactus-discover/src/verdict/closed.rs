@@ -27,7 +27,7 @@ pub struct Closed {
     pub share: f64,
     /// Its standard error, from the scatter of presses; `None` of fewer than three.
     pub standard_error: Option<f64>,
-    /// The share if only what lasts is left, and [`MOST_ERRORS`] of its standard errors; infinite of fewer than three presses.
+    /// The share if only what lasts is left, and two of its standard errors; infinite of fewer than three presses.
     pub most: f64,
 }
 
