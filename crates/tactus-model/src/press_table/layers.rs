@@ -210,14 +210,15 @@ impl Maker<'_> {
 
     /// Pieces between depths.
     fn pieces(&self, ends: &[AtDepth]) -> Vec<Piece> {
-        let tables = |of: &AtDepth| -> [Tables; 3] {
-            let below = self.tables(&of.slope);
-            let above = of.slope_above.as_ref().map_or_else(|| below.clone(), |slope| self.tables(slope));
-            [self.tables(&of.value), below, above]
+        type OfEnd = (Tables, Tables, Option<Tables>);
+        let tables = |of: &AtDepth| -> OfEnd {
+            let above = of.slope_above.as_ref().map(|slope| self.tables(slope));
+            (self.tables(&of.value), self.tables(&of.slope), above)
         };
-        let tables: Vec<[Tables; 3]> = ends.par_iter().map(tables).collect();
-        let piece = |(ends, tables): (&[AtDepth], &[[Tables; 3]])| {
-            let [[from_value, from_slope, _], [value, _, above]] = [&tables[0], &tables[1]];
+        let tables: Vec<OfEnd> = ends.par_iter().map(tables).collect();
+        let piece = |(ends, tables): (&[AtDepth], &[OfEnd])| {
+            let [(from_value, from_slope, _), (value, below, above)] = [&tables[0], &tables[1]];
+            let above = above.as_ref().unwrap_or(below);
             Piece {
                 from_mm: ends[0].depth_mm,
                 to_mm: ends[1].depth_mm,
