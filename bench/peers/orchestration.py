@@ -1,8 +1,11 @@
-"""Presses per second of a scripted run without real devices: Tactus on the embedded rig in virtual time, beside bluesky on ophyd.sim.
+"""Presses, points and readings per second of a script without real devices: Tactus on the embedded rig in virtual time, beside bluesky on
+ophyd.sim.
 
 Tactus plans, checks against the envelope, moves in confirmed steps, simulates the covering and 30 frames per second, supervises and
 records. bluesky's `grid_scan` sets two simulated axes without delay, reads one detector, and hands documents to one subscriber, which
-counts them. So one point of bluesky stands beside one press. `tactus plan` is the dry run alone, on the rig's twin.
+counts them; `count` reads the detector only. A press is held against a point of `grid_scan`, although it is some hundred frames;
+`points.star` moves and reads as `grid_scan` does, and `readings.star` reads as `count` does. `tactus plan` is the dry run alone, on the
+rig's twin; it records nothing.
 """
 
 import argparse
@@ -14,6 +17,10 @@ import time
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[2]
+HERE = Path(__file__).parent
+
+# What is counted, the script, and how often the script does it; `None`: as often as the program says.
+WORKS = {"presses": ("grid-sweep", None), "points": (HERE / "points.star", 100 * 100), "readings": (HERE / "readings.star", 10_000)}
 
 
 def main():
@@ -23,44 +30,60 @@ def main():
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     args.binary = args.binary.resolve()
-    ways = {"tactus run": [], "tactus plan": [], "bluesky": []}
+    rows = []
     for _ in range(args.rounds):
-        ways["tactus run"].append(tactus(args.binary, "run", "--embedded", "--no-report"))
-        ways["tactus plan"].append(tactus(args.binary, "plan"))
-        ways["bluesky"].append(bluesky())
-    result = {who: {key: statistics.median(one[key] for one in all_) for key in all_[0]} for who, all_ in ways.items()}
+        grid_scan, count = bluesky()
+        peers = {"presses": grid_scan, "points": grid_scan, "readings": count}
+        for work in WORKS:
+            rows.append((work, "tactus run", tactus(args.binary, work, "run", "--embedded", "--no-report")))
+            rows.append((work, "tactus plan", tactus(args.binary, work, "plan")))
+            rows.append((work, "bluesky", peers[work]))
+    result = {}
+    for work, who, one in rows:
+        result.setdefault(work, {}).setdefault(who, []).append(one)
+    for ways in result.values():
+        for who, rounds in ways.items():
+            ways[who] = {key: statistics.median(one[key] for one in rounds) for key in rounds[0]}
     if args.json:
         print(json.dumps(result, indent=1))
         return
-    print(f"{'who':<14}{'presses':>9}{'s':>9}{'presses/s':>12}{'to bluesky':>12}")
-    for who, one in result.items():
-        ratio = one["per_s"] / result["bluesky"]["per_s"]
-        print(f"{who:<14}{one['presses']:>9.0f}{one['s']:>9.3f}{one['per_s']:>12,.0f}{ratio:>12.1f}")
+    print(f"{'what':<10}{'who':<14}{'done':>9}{'s':>9}{'a second':>12}{'to bluesky':>12}")
+    for work, ways in result.items():
+        for who, one in ways.items():
+            ratio = one["per_s"] / ways["bluesky"]["per_s"]
+            print(f"{work:<10}{who:<14}{one['done']:>9.0f}{one['s']:>9.3f}{one['per_s']:>12,.0f}{ratio:>12.1f}")
 
 
-def tactus(binary, command, *options):
+def tactus(binary, work, command, *options):
+    script, done = WORKS[work]
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        done = subprocess.run([binary, command, "grid-sweep", *options, "--json"], cwd=folder, capture_output=True, text=True)
+        ended = subprocess.run([binary, command, script, *options, "--json"], cwd=folder, capture_output=True, text=True)
         seconds = time.perf_counter() - start
-    if done.returncode:
-        raise SystemExit(done.stderr)
-    presses = json.loads(done.stdout)["presses"]
-    return {"presses": presses, "s": seconds, "per_s": presses / seconds}
+    if ended.returncode:
+        raise SystemExit(ended.stderr)
+    done = done or json.loads(ended.stdout)["presses"]
+    return {"done": done, "s": seconds, "per_s": done / seconds}
 
 
-def bluesky(across=20):
+def bluesky(across=20, readings=400):
+    """A raster of `across` by `across` points, and `readings` of one place."""
     from bluesky import RunEngine
-    from bluesky.plans import grid_scan
+    from bluesky.plans import count, grid_scan
     from ophyd.sim import det, motor1, motor2
 
     events = []
     engine = RunEngine({})
     engine.subscribe(lambda name, _: events.append(name), "event")
-    start = time.perf_counter()
-    engine(grid_scan([det], motor1, 0, 1, across, motor2, 0, 1, across))
-    seconds = time.perf_counter() - start
-    return {"presses": len(events), "s": seconds, "per_s": len(events) / seconds}
+
+    def timed(plan):
+        events.clear()
+        start = time.perf_counter()
+        engine(plan)
+        seconds = time.perf_counter() - start
+        return {"done": len(events), "s": seconds, "per_s": len(events) / seconds}
+
+    return timed(grid_scan([det], motor1, 0, 1, across, motor2, 0, 1, across)), timed(count([det], readings))
 
 
 if __name__ == "__main__":

@@ -52,12 +52,20 @@ fn press(within: usize) -> (Phase, f64) {
     }
 }
 
-/// Presses of 3 s on all elements, in an order unrelated to place, with given counts.
-fn frames(known: &Known, way: Way, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
+/// Element on whose centre a press goes.
+type Place = fn(usize) -> usize;
+
+/// All elements, in an order unrelated to place.
+fn all_over(press: usize) -> usize {
+    press * 29 % ELEMENTS
+}
+
+/// Presses of 3 s, as many as there are elements, with given counts.
+fn frames(known: &Known, way: Way, place: Place, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
     let mut frames = Frames::new(ELEMENTS);
     for (frame, t_ns) in (0..30 * ELEMENTS).zip((0..).step_by(100_000_000)) {
         let (press, within) = (frame / 30, frame % 30);
-        let [x, y] = known.array.centre_mm(press * 29 % ELEMENTS).unwrap();
+        let [x, y] = known.array.centre_mm(place(press)).unwrap();
         let (phase, depth_mm) = way(within);
         let depth_mm = if press % 2 == 0 { depth_mm } else { 0.7 * depth_mm };
         #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
@@ -95,9 +103,18 @@ pub(crate) fn measured(known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> 
 
 /// The same of presses that go this way.
 pub(crate) fn measured_along(way: Way, known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
-    let blank = frames(known, way, |_| vec![0.0; ELEMENTS]);
+    measured_by(way, all_over, known, effects, upon)
+}
+
+/// The same of presses at these places.
+pub(crate) fn measured_at(place: Place, known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
+    measured_by(press, place, known, effects, upon)
+}
+
+fn measured_by(way: Way, place: Place, known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
+    let blank = frames(known, way, place, |_| vec![0.0; ELEMENTS]);
     let clean = predict(known, &blank, &base(known), effects).unwrap();
-    frames(known, way, |frame| {
+    frames(known, way, place, |frame| {
         let clean = &clean[frame * ELEMENTS..(frame + 1) * ELEMENTS];
         clean.iter().zip(&upon[frame]).map(|(clean, upon)| f64::from(*clean) + upon).collect()
     })

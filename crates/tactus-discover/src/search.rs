@@ -58,3 +58,4 @@ pub use not_shown::NotShown;
 pub use options::{Options, Rule};
 pub(crate) use scatter::Scattered;
 pub(crate) use score::{q_values, sign_flip_p};
+pub(crate) use wiring::Partners;

@@ -3,7 +3,7 @@ use rand_chacha::ChaCha8Rng;
 use tactus_model::Effect;
 
 use crate::Verdict;
-use crate::fixtures::{ELEMENTS, found, known, measured, processes};
+use crate::fixtures::{ELEMENTS, found, known, measured, measured_at, processes};
 
 /// The paper's two faulty elements, which answer for a neighbour each, beside effects that hide them.
 #[test]
@@ -52,4 +52,23 @@ fn dead_elements_are_named_and_not_taken_for_a_tool_of_another_size() {
     let mut elements: Vec<f64> = found.steps[0].terms.iter().map(|term| term[0].value).collect();
     elements.sort_by(f64::total_cmp);
     assert_eq!(elements, [5.0, 39.0]);
+}
+
+/// Pressed at three places only, elements far from each other have signals of one shape.
+#[test]
+fn where_presses_do_not_tell_whose_signal_an_element_gives_no_other_is_named() {
+    let known = known();
+    let parameters = [("element", 18.0), ("answers_for", 19.0), ("own_share", 0.0), ("other_share", 1.0)];
+    let answers = [Effect::new("miswired", parameters).unwrap()];
+    let noise = processes(ELEMENTS, 2.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(3));
+    let partner = |frames| {
+        let found = found(&known, &frames);
+        let wires = found.steps.into_iter().find(|step| step.effect == "miswired").unwrap();
+        let [term] = &wires.terms[..] else { panic!("{:?}", wires.terms) };
+        assert_eq!((term[0].name, term[0].value.to_bits()), ("element", 18.0_f64.to_bits()));
+        term.iter().find(|one| one.name == "answers_for").map(|one| one.value)
+    };
+    assert_eq!(partner(measured(&known, &answers, &noise)), Some(19.0));
+    let three_places = |press: usize| [0, 5, 47][press % 3];
+    assert_eq!(partner(measured_at(three_places, &known, &answers, &noise)), None);
 }

@@ -8,7 +8,7 @@ use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, FoldsOf, Prepared, Problem, Term, gains_by_folds};
 use crate::progress::Stage;
 use crate::search::{
-    Equivalent, FLIPS, Formed, POLISH_ROUNDS, Refuted, RefutedFormula, Search, names, q_values, sign_flip_p,
+    Equivalent, FLIPS, Formed, POLISH_ROUNDS, Partners, Refuted, RefutedFormula, Search, names, q_values, sign_flip_p,
     without,
 };
 
@@ -18,6 +18,8 @@ const CONFIRMED_P: f64 = 0.05;
 /// Few blocks cannot give so small a probability. They confirm if all agree: then it is the least that they can give, and otherwise at
 /// least twice as much.
 const AGREED: f64 = 1.5;
+/// The parameter of a miswired element that names another one.
+const ANSWERS_FOR: &str = "answers_for";
 
 /// A grown model whose effects are confirmed.
 pub(crate) struct Confirmed {
@@ -134,6 +136,7 @@ impl Search<'_> {
                 None => problem.fit_from(less, POLISH_ROUNDS)?,
             };
             let gains = problem.heldout_gains(&before.predicted, &grown.predicted);
+            let partners = (name == MISWIRED).then(|| Partners::of(problem, &before));
             let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(known_terms);
             let estimated = |(term, errors): (&Term, &Vec<f64>)| {
                 term.definition
@@ -143,6 +146,10 @@ impl Search<'_> {
                     .zip(errors)
                     .enumerate()
                     .filter(|(parameter, ((known, value), _))| {
+                        let is_told = partners.as_ref().is_none_or(|partners| is_told(partners, term));
+                        if known.name == ANSWERS_FOR && !is_told {
+                            return false;
+                        }
                         // Beside a table, the others stay neutral.
                         term.acts(*parameter)
                             && (term.tables.is_empty() || value.to_bits() != known.neutral.to_bits())
@@ -191,6 +198,15 @@ impl Search<'_> {
         }
         Ok(steps)
     }
+}
+
+/// True if the data tell for which other element a miswired one answers.
+fn is_told(partners: &Partners, miswired: &Term) -> bool {
+    let of = |name: &str| {
+        let at = miswired.definition.parameters.iter().position(|parameter| parameter.name == name)?;
+        miswired.values.get(at).map(|index| *index as usize)
+    };
+    of("element").zip(of(ANSWERS_FOR)).is_none_or(|(element, other)| partners.tell(element, other))
 }
 
 /// The free curves and the tables of an added effect, beside the formula that the data refute.

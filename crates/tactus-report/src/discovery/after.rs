@@ -8,7 +8,7 @@ use super::{
     DiscoveryReport, draft,
     figures::staircase,
     gap, next,
-    words::{self, list, percent},
+    words::{self, list},
 };
 use crate::{
     document::{Column, Table},
@@ -75,7 +75,6 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
 }
 
 fn unexplained(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
-    let share = percent(found.unexplained.share);
     writeln!(f, "<section>\n<h2>What stays unexplained</h2>")?;
     if found.verdict == Verdict::CannotJudge {
         writeln!(f, "<p>Unknown: these data do not tell it from noise.</p>")?;
@@ -84,7 +83,7 @@ fn unexplained(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     } else {
         writeln!(
             f,
-            "<p class=\"warn\">{share} of the gap is left. It depends on {}, and no effect of the library explains it, so the grown model does \
+            "<p class=\"warn\">What is left of the gap depends on {}, and no effect of the library explains it, so the grown model does \
              not contain it.</p>",
             Text(list(&found.unexplained.depends_on))
         )?;

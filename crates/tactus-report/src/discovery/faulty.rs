@@ -50,9 +50,11 @@ pub(super) fn in_words(found: &Discovery) -> Option<String> {
     let fitted = found.steps.iter().filter(|step| step.effect == "miswired").flat_map(|step| &step.terms);
     let fitted = fitted.filter_map(|term| {
         let of = |name: &str| term.iter().find(|one| one.name == name).map(|one| one.value);
-        let (element, answers_for) =
-            (of("element").filter(|element| !is_told(*element))?, of("answers_for")?);
-        Some(format!("element {element} answers for {answers_for}"))
+        let element = of("element").filter(|element| !is_told(*element))?;
+        Some(of("answers_for").map_or_else(
+            || format!("element {element} does not give its own signal (the presses do not tell whose)"),
+            |answers_for| format!("element {element} answers for {answers_for}"),
+        ))
     });
     let all: Vec<String> = silent.into_iter().flatten().chain(crossed).chain(fitted).collect();
     (!all.is_empty()).then(|| format!("Faulty: {}.", list(all)))

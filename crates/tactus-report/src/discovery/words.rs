@@ -126,14 +126,11 @@ fn runs(found: &Discovery) -> String {
     })
 }
 
-/// The unexplained share, and the covariates on which it depends.
+/// The covariates on which what is left depends. How much that is, is told before.
 fn left(found: &Discovery) -> String {
-    let share = percent(found.unexplained.share);
     match &found.unexplained.depends_on[..] {
-        [] => format!("The remaining {share} of the gap depends on no covariate examined."),
-        depends_on => {
-            format!("The remaining {share} of the gap depends on {}.", list(depends_on.iter().copied()))
-        }
+        [] => "What is left depends on no covariate examined.".to_owned(),
+        depends_on => format!("What is left depends on {}.", list(depends_on.iter().copied())),
     }
 }
 

@@ -291,7 +291,7 @@ fn the_verdict_says_what_it_rests_on() {
         in_words(&unexplained()),
         "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms and the noise \
          is 2.00 counts, from repeats of a place. Of readings with a signal, 4.6 times the noise (9.1 counts) is not noise; with 95 % \
-         confidence it is at most 5.7 times the noise (11 counts). The remaining 100 % of the gap depends on time since contact and depth. \
+         confidence it is at most 5.7 times the noise (11 counts). What is left depends on time since contact and depth. \
          hysteresis would close 82 % of it, but is not named: a dependence on place along x that is no effect explains more."
     );
     assert_eq!(
@@ -306,7 +306,7 @@ fn the_verdict_says_what_it_rests_on() {
         ..explained()
     };
     assert!(in_words(&partly).ends_with(
-        "The remaining 30 % of the gap depends on temperature. Faulty: element 18 answers for 19 and element 19 answers for 18."
+        "What is left depends on temperature. Faulty: element 18 answers for 19 and element 19 answers for 18."
     ));
 }
 
