@@ -394,7 +394,10 @@ pub async fn stop(
         Err(error) => sources.push(Box::new(error)),
     }
     if answers.is_empty() {
-        let source = sources.pop().unwrap_or_else(|| "nobody serves the rig there".into());
+        let source = match reach(endpoint).await {
+            Err(nobody) => nobody.into(),
+            Ok(()) => sources.pop().unwrap_or_else(|| "nobody serves the rig there".into()),
+        };
         return Err(BusError::NotStopped { endpoint: endpoint.to_string(), source });
     }
     Ok(answers.into_values().collect())

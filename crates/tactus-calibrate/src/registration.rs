@@ -132,9 +132,15 @@ pub(crate) fn register(
     readings: &Readings,
     sound: &[bool],
 ) -> Result<(RegistrationFit, SensorPose), String> {
+    if readings.presses.iter().all(|press| press.dwells.is_empty()) {
+        return Err(
+            "there is no press: the tip never stood still in the covering. In an imported table the mapping's `still_mm` decides that"
+                .into(),
+        );
+    }
     let presses: Vec<&MeasuredPress> =
         across(declared, readings).into_iter().filter(|press| press.rest.is_some()).collect();
-    if presses.is_empty() && !readings.presses.is_empty() {
+    if presses.is_empty() {
         return Err("no reference press has frames at rest before it, with nothing on the covering".into());
     }
     if presses.iter().all(|press| press.dwells.iter().all(|dwell| dwell.height_mm >= 0.0)) {

@@ -86,6 +86,11 @@ impl Column {
             .map(|_| [finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max)])
     }
 
+    /// True if every number is whole.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.numbers.iter().filter(|number| number.is_finite()).all(|number| number.fract() == 0.0)
+    }
+
     /// A cell as text.
     pub(crate) fn text(&self, row: usize) -> String {
         self.texts.get(&row).cloned().unwrap_or_else(|| self.numbers[row].to_string())

@@ -141,19 +141,20 @@ fn rig(f: &mut fmt::Formatter<'_>, columns: &Columns, family: Option<&Family>) -
     f.write_str("\n# The rig; or rig = \"my-rig.toml\" before the first table.\n[rig]\n#? name = \"my-rig\"\n#? indenter = \"tip\"\n\n[rig.array]\n")?;
     let elements =
         family.map_or(String::new(), |family| format!("    # {} elements in all", family.elements));
-    let most = family.and_then(|family| {
-        let greatest = |number: usize| {
-            columns.get("", &family.pattern.replace(NUMBER, &number.to_string())).ok().and_then(Column::range)
-        };
-        (family.first..family.first + family.elements)
-            .filter_map(greatest)
-            .map(|[_, most]| most)
-            .reduce(f64::max)
+    let readings: Vec<&Column> = family.map_or_else(Vec::new, |family| {
+        let of = |number: usize| columns.get("", &family.pattern.replace(NUMBER, &number.to_string())).ok();
+        (family.first..family.first + family.elements).filter_map(of).collect()
     });
+    let most = readings.iter().filter_map(|column| column.range()).map(|[_, most]| most).reduce(f64::max);
     let most = most.map_or(String::new(), |most| format!("    # the greatest reading here is {most}"));
+    let step = if readings.iter().all(|column| column.is_whole()) {
+        ""
+    } else {
+        "#? step_counts = 1.0    # step of the converter; the readings are no whole numbers\n"
+    };
     writeln!(
         f,
-        "#? rows = 6{elements}\n#? cols = 8\n#? pitch_mm = [2.0, 2.0]\n#? element_mm = [1.8, 1.8]\n#? full_scale_counts = 4095{most}\n\n\
+        "#? rows = 6{elements}\n#? cols = 8\n#? pitch_mm = [2.0, 2.0]\n#? element_mm = [1.8, 1.8]\n#? full_scale_counts = 4095{most}\n{step}\n\
          [rig.registration]\n#? origin_mm = [0.0, 0.0]    # the array's first corner in the stage's coordinates, about\n\n\
          [rig.covering]\n#? thickness_mm = 1.0\n\n\
          [rig.indenters]\n#? tip = {{ shape = \"cylinder\", diameter_mm = 1.0 }}"

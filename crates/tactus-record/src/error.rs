@@ -101,6 +101,9 @@ pub enum RowsError {
     /// No file was named.
     #[error("no recording or measurement table was named")]
     Nothing,
+    /// The file has no bytes.
+    #[error("{} is empty: nothing was written to it", path.display())]
+    Empty { path: PathBuf },
     /// The file is of another kind.
     #[error("{} is neither a recording (MCAP) nor a measurement table (Parquet): only these hold measured rows. `tactus import` makes a table of another file", path.display())]
     Neither { path: PathBuf },

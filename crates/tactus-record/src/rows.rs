@@ -171,6 +171,8 @@ impl RowSources {
             self.recording(&Timeline::read(path)?, take)
         } else if start.starts_with(PARQUET_MAGIC) {
             self.table(TableReader::open(path)?, take)
+        } else if start.is_empty() {
+            Err(RowsError::Empty { path: path.to_owned() })
         } else {
             Err(RowsError::Neither { path: path.to_owned() })
         }
@@ -309,6 +311,7 @@ impl RowsError {
                 Self::RigsDiffer { first, path, difference, groups: RigGroups::of(paths, go_together) }
             }
             other @ (Self::Nothing
+            | Self::Empty { .. }
             | Self::Neither { .. }
             | Self::Record(_)
             | Self::Table(_)

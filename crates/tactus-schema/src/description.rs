@@ -25,11 +25,26 @@ pub(crate) fn wrong(field: impl Into<String>, problem: impl Into<String>) -> Wro
     WrongField { field: field.into(), problem: problem.into() }
 }
 
+/// The schema that the text of a TOML file states: the value of its key `schema`, before any table.
+pub fn stated_schema(text: &str) -> Option<&str> {
+    let top = text.lines().map(str::trim_start).take_while(|line| !line.starts_with('['));
+    top.filter_map(|line| line.strip_prefix("schema")?.trim_start().strip_prefix('='))
+        .find_map(|value| value.split(['"', '\'']).nth(1))
+}
+
+/// Refuses the text of a TOML file of another schema, before its fields are looked at: of another kind of file all would be unknown.
+pub(crate) fn check_kind(read: &str, text: &str) -> Result<(), WrongField> {
+    stated_schema(text).map_or_else(
+        || Err(wrong("schema", format!("missing; this program reads {read:?} here"))),
+        |stated| check_schema(read, stated),
+    )
+}
+
 /// Refuses a file of another schema or version.
 pub(crate) fn check_schema(read: &str, stated: &str) -> Result<(), WrongField> {
     if stated == read {
         Ok(())
     } else {
-        Err(wrong("schema", format!("this program reads {read:?}, not {stated:?}")))
+        Err(wrong("schema", format!("this program reads {read:?} here, not {stated:?}")))
     }
 }

@@ -31,7 +31,7 @@ use serde::{Deserialize, Serialize};
 use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, Definition, Draft, EffectError, Law, PipelineStage, When};
 
-use crate::description::{WrongField, check_schema, wrong};
+use crate::description::{WrongField, check_kind, check_schema, wrong};
 
 /// The schema's name in the file.
 pub const SCHEMA: &str = "tactus.draft/1";
@@ -197,6 +197,7 @@ impl DraftFile {
     /// # Errors
     /// [`DraftFileError`] names the line and key, or the field that is wrong.
     pub fn from_toml(text: &str) -> Result<Self, DraftFileError> {
+        check_kind(SCHEMA, text)?;
         let raw: RawFile = toml::from_str(text)?;
         check_schema(SCHEMA, &raw.schema)?;
         let draft = raw.effect.check("effect")?;

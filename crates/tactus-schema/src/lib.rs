@@ -14,6 +14,7 @@ mod frame;
 mod message;
 mod time;
 
+pub use description::stated_schema;
 pub use draft::{DraftFile, DraftFileError};
 pub use frame::{Frame, FrameFlags};
 pub use message::{Message, pb, with_message};

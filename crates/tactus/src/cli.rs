@@ -468,7 +468,7 @@ pub(crate) struct ExportArgs {
 /// Arguments of `import`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ImportArgs {
-    /// .csv, .tsv, .txt, .npz or .mcap (JSON messages) files with the same columns.
+    /// .csv, .tsv, .txt, .npz or .mcap (JSON, protobuf or CDR messages) files with the same columns.
     #[arg(required = true)]
     pub(crate) files: Vec<PathBuf>,
     /// The mapping: which column is what, in which unit.

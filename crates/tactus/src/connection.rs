@@ -61,7 +61,7 @@ pub(crate) async fn release(held: HeldLease) {
 /// The service, or `None` if nothing listens at the default endpoint.
 ///
 /// # Errors
-/// If nothing listens at an endpoint that was given: who names a service does not mean the embedded rig.
+/// If nothing listens at an endpoint that was given, or a rig was named: who names either does not mean the embedded rig.
 pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
     match look(common).await? {
         None if common.is_endpoint_given => bail!(
@@ -69,6 +69,16 @@ pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
              the embedded simulated rig with --embedded",
             common.endpoint
         ),
+        None => {
+            if let Some(rig) = &common.rig {
+                bail!(
+                    "no rig {rig:?}: no service at {}. Start `tactusd --config FILE`, leave out --rig (TACTUS_RIG) to use the embedded \
+                     simulated rig, or name a rig's file with --rig-file",
+                    common.endpoint
+                );
+            }
+            Ok(None)
+        }
         found => Ok(found),
     }
 }

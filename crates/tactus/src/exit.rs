@@ -1,6 +1,7 @@
 //! The exit codes.
 
 use std::fmt;
+use std::io;
 use std::process::ExitCode;
 
 use tactus_schema::pb::ExitStatus;
@@ -87,6 +88,12 @@ pub(crate) fn in_words(error: &anyhow::Error) -> String {
             words.push_str(if words.is_empty() { "" } else { ": " });
             words.push_str(&cause);
         }
+    }
+    let is_folder = |cause: &(dyn std::error::Error + 'static)| {
+        cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::IsADirectory)
+    };
+    if error.chain().any(is_folder) {
+        words.push_str("; name files of this folder, not the folder");
     }
     words
 }

@@ -18,12 +18,13 @@ pub(super) fn programs() -> Vec<Command> {
 pub(super) fn page() -> String {
     let mut page = "Every option of every program, as `--help` tells it. The manual pages (`man tactus-run`) say the same.\n".to_owned();
     for program in programs() {
-        describe(&program, &mut page);
+        describe(&program, &[], &mut page);
     }
     page
 }
 
-fn describe(command: &Command, page: &mut String) {
+/// `inherited` options are told of the command above this one.
+fn describe(command: &Command, inherited: &[&str], page: &mut String) {
     let name = command.get_bin_name().unwrap_or(command.get_name());
     let about = command.get_long_about().or(command.get_about()).map(ToString::to_string).unwrap_or_default();
     let usage = command.clone().render_usage().to_string();
@@ -31,8 +32,8 @@ fn describe(command: &Command, page: &mut String) {
     // Writing to a string cannot fail.
     let _written = write!(page, "\n## {name}\n\n{about}\n\n```text\n{usage}\n```\n");
     let own = |arg: &&Arg| {
-        let is_common = arg.is_global_set() && name.contains(' ');
-        !arg.is_hide_set() && !is_common && !["help", "version"].contains(&arg.get_id().as_str())
+        let id = arg.get_id().as_str();
+        !arg.is_hide_set() && !inherited.contains(&id) && !["help", "version"].contains(&id)
     };
     let args: Vec<&Arg> = command.get_arguments().filter(own).collect();
     if !args.is_empty() {
@@ -41,9 +42,11 @@ fn describe(command: &Command, page: &mut String) {
             let _written = writeln!(page, "| `{}` | {} |", cell(&call(arg)), cell(&meaning(arg)));
         }
     }
+    let global = command.get_arguments().filter(|arg| arg.is_global_set()).map(|arg| arg.get_id().as_str());
+    let inherited: Vec<&str> = inherited.iter().copied().chain(global).collect();
     for inner in command.get_subcommands().filter(|inner| !inner.is_hide_set() && inner.get_name() != "help")
     {
-        describe(inner, page);
+        describe(inner, &inherited, page);
     }
 }
 

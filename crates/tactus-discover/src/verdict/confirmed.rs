@@ -201,6 +201,7 @@ impl Search<'_> {
 }
 
 /// True if the data tell for which other element a miswired one answers.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "numbers of elements")]
 fn is_told(partners: &Partners, miswired: &Term) -> bool {
     let of = |name: &str| {
         let at = miswired.definition.parameters.iter().position(|parameter| parameter.name == name)?;

@@ -125,8 +125,11 @@ fn runs_of_a_rig_that_was_calibrated_and_renamed_between_them_go_together() {
 #[test]
 fn what_holds_no_rows_is_refused_with_what_is_accepted() {
     let dir = tempfile::tempdir().unwrap();
-    for bytes in [&b""[..], b"PAR", b"run,press\n"] {
-        let path = dir.path().join("table.parquet");
+    let path = dir.path().join("table.parquet");
+    fs::write(&path, b"").unwrap();
+    let text = refused(&[&path]).0.to_string();
+    assert!(text.ends_with("table.parquet is empty: nothing was written to it"), "{text}");
+    for bytes in [&b"PAR"[..], b"run,press\n"] {
         fs::write(&path, bytes).unwrap();
         let text = refused(&[&path]).0.to_string();
         assert!(text.contains("neither a recording (MCAP) nor a measurement table (Parquet)"), "{text}");

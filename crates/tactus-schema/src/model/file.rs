@@ -8,7 +8,7 @@ use tactus_model::{Array, Covering, Effect, Psf, Response};
 
 use super::{BaseModel, Evidence, KnownEffect, Model, ModelFileError};
 use crate::description::{
-    OneOrEach, RawArray, RawIndenter, WrongField, check_schema, not_negative, positive, wrong,
+    OneOrEach, RawArray, RawIndenter, WrongField, check_kind, check_schema, not_negative, positive, wrong,
 };
 use crate::draft::RawDraft;
 
@@ -128,6 +128,7 @@ impl Model {
     /// # Errors
     /// [`ModelFileError`] names the line and key, the field or the effect that is wrong.
     pub fn from_toml(text: &str) -> Result<Self, ModelFileError> {
+        check_kind(SCHEMA, text)?;
         let raw: RawModel = toml::from_str(text)?;
         check_schema(SCHEMA, &raw.schema)?;
         let base = raw.base.check()?;

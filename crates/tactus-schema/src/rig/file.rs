@@ -12,7 +12,7 @@ use super::stage::RawStageLink;
 use super::{Rig, RigError, SensitivityReference};
 use crate::Model;
 use crate::description::{
-    OneOrEach, RawArray, RawIndenter, WrongField, check_schema, not_negative, positive, wrong,
+    OneOrEach, RawArray, RawIndenter, WrongField, check_kind, check_schema, not_negative, positive, wrong,
 };
 
 /// The schema's name in the file.
@@ -98,6 +98,7 @@ impl Rig {
     /// # Errors
     /// [`RigError`] names the line and key, or the field, that is wrong.
     pub fn from_toml(text: &str) -> Result<Self, RigError> {
+        check_kind(SCHEMA, text)?;
         toml::from_str::<RawRig>(text)?.check()
     }
 

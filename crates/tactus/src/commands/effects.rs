@@ -87,7 +87,11 @@ fn show(common: &Common, held: &[Held], name: &str) -> anyhow::Result<()> {
         ("shown by", known.shown_by.join(", ")),
     ]);
     say("");
-    say_next("`tactus run diagnose` measures what may show it, `tactus discover RUNS` looks for it");
+    say_next(&format!(
+        "`tactus run diagnose` measures what may show it, `tactus discover RUNS` looks for it; equation, units and source: \
+         docs/book/reference/effects.md#{}",
+        known.name
+    ));
     Ok(())
 }
 

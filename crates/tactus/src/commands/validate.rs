@@ -9,7 +9,7 @@ use tactus_record::Completeness;
 use tactus_runner::config::{self, ConfigError, Rigs, ServiceConfig};
 use tactus_runner::embedded::{HIDDEN_SCHEMA, SIMULATED_RIG, TruthFile};
 use tactus_runner::experiments;
-use tactus_schema::{DraftFile, Model, Rig, draft, model, rig};
+use tactus_schema::{DraftFile, Model, Rig, draft, model, rig, stated_schema};
 use tactus_wire::declared;
 
 use super::link;
@@ -52,7 +52,7 @@ fn next_command(file: &Path) -> Option<String> {
         "star" => format!("`tactus plan {path}` dry-runs it"),
         "parquet" => format!("`tactus calibrate {path}` fits the sensor to it"),
         "mcap" => format!("`tactus report {path}` shows the run"),
-        _ => match schema(&std::fs::read_to_string(file).ok()?) {
+        _ => match stated_schema(&std::fs::read_to_string(file).ok()?) {
             Some(rig::SCHEMA) => {
                 format!("`tactus plan element-centres --rig-file {path}` dry-runs an experiment on it")
             }
@@ -118,7 +118,7 @@ fn check(file: &Path) -> anyhow::Result<String> {
 /// The `schema` key says what the file is; without one it is a service's configuration.
 fn check_toml(file: &Path) -> anyhow::Result<String> {
     let text = std::fs::read_to_string(file).context("cannot be read")?;
-    match schema(&text) {
+    match stated_schema(&text) {
         Some(rig::SCHEMA) => Ok(rig_in_words(&config::load_rig(file)?.rig)),
         Some(model::SCHEMA) => {
             let Model { base, effects } = Model::from_toml(&text)?;
@@ -157,14 +157,6 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
             Ok(format!("a service's configuration for {rigs} {}", names.join(", ")))
         }
     }
-}
-
-/// The value of the `schema` key.
-fn schema(text: &str) -> Option<&str> {
-    text.lines().find_map(|line| {
-        let value = line.trim_start().strip_prefix("schema")?.trim_start().strip_prefix('=')?;
-        value.split(['"', '\'']).nth(1)
-    })
 }
 
 fn check_script(file: &Path) -> anyhow::Result<String> {
