@@ -483,7 +483,7 @@ hosts: build
         CARGO_PROFILE_RELEASE_OPT_LEVEL=0 CARGO_PROFILE_RELEASE_LTO=off CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 \
         cargo install --locked zenohd --version 1.10.2 --no-default-features --features zenoh/transport_tcp \
         --root {{ tools }} --target-dir {{ tools }}/build
-    TACTUS_ZENOHD={{ tools }}/bin/zenohd cargo test --workspace --test e2e hosts:: -- --nocapture
+    TACTUS_ZENOHD={{ tools }}/bin/zenohd cargo test --workspace --test e2e hosts:: -- --nocapture --include-ignored
 
 # Plants defects, one at a time: the tests must find each.
 mutants word="":

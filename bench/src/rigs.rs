@@ -50,6 +50,8 @@ pub struct RigsTrial {
     pub time: Duration,
     /// Every rig has a run in progress, and so a recording.
     pub is_recording: bool,
+    /// The devices of so many rigs die in the middle. What is counted is the others'.
+    pub dying: usize,
     /// Processors of the service, as `taskset` writes them; all of them without.
     pub cores: Option<String>,
 }
@@ -59,7 +61,9 @@ pub struct RigsTrial {
 pub struct RigsMeasured {
     /// Number of rigs.
     pub rigs: usize,
-    /// Frames a second that reached the subscriber, of all rigs.
+    /// Those of them whose devices lived all the time. The frames are theirs.
+    pub whole_rigs: usize,
+    /// Frames a second that reached the subscriber.
     pub frames_per_s: f64,
     /// Sequence numbers that the subscriber did not see, from the first to the last of each rig.
     pub missed: u64,
@@ -81,6 +85,13 @@ struct Seen {
     first: u64,
     last: u64,
     count: u64,
+}
+
+impl Seen {
+    /// How many frames from the first to the last are not among so many that are there.
+    fn lacks(self, there: u64) -> u64 {
+        (self.last + 1 - self.first).saturating_sub(there)
+    }
 }
 
 /// What the subscriber reads of a [`pb::Frame`].
@@ -148,19 +159,23 @@ impl RigsTrial {
         let pid = service.child.id();
         let (began, before) = (Instant::now(), processor_s(pid)?);
         is_counting.store(true, Ordering::Relaxed);
-        sleep(self.time).await;
+        sleep(self.time / 2).await;
+        devices.kill(self.dying);
+        sleep(self.time / 2).await;
         is_counting.store(false, Ordering::Relaxed);
         let (seconds, spent_s) = (began.elapsed().as_secs_f64(), processor_s(pid)? - before);
         let (memory_kib, threads) = (status(pid, "RssAnon:")?, status(pid, "Threads:")?);
         service.end()?;
-        let seen = seen.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner).clone();
         ensure!(seen.len() == self.rigs, "frames of {} of {} rigs came", seen.len(), self.rigs);
+        seen.retain(|rig, _| !names.iter().take(self.dying).any(|dying| dying == rig));
         let frames: u64 = seen.values().map(|of| of.count).sum();
         let unrecorded = self.is_recording.then(|| unrecorded(service.folder.path(), &seen)).transpose()?;
         Ok(RigsMeasured {
             rigs: self.rigs,
+            whole_rigs: seen.len(),
             frames_per_s: frames as f64 / seconds,
-            missed: seen.values().map(|of| of.last + 1 - of.first - of.count).sum(),
+            missed: seen.values().map(|of| of.lacks(of.count)).sum(),
             unrecorded,
             frame_us: spent_s * 1e6 / frames as f64,
             cores: spent_s / seconds,
@@ -208,7 +223,7 @@ impl RigsTrial {
 impl RigsMeasured {
     /// True if no frame was lost and the rate was kept.
     pub fn is_whole(&self) -> bool {
-        let wanted = RATE_HZ * self.rigs as f64;
+        let wanted = RATE_HZ * self.whole_rigs as f64;
         self.missed == 0 && self.unrecorded.is_none_or(|lost| lost == 0) && self.frames_per_s > 0.98 * wanted
     }
 }
@@ -335,15 +350,15 @@ fn count(seen: &Mutex<HashMap<String, Seen>>, key: &str, payload: &[u8]) {
 fn unrecorded(folder: &Path, seen: &HashMap<String, Seen>) -> Result<u64> {
     let mut missing = 0;
     for (rig, of) in seen {
-        let mut runs = fs::read_dir(folder.join("runs").join(rig))?;
-        let run = runs.next().with_context(|| format!("rig {rig} has no recording"))??;
+        let runs = fs::read_dir(folder.join("runs").join(rig))?.flatten().map(|run| run.path());
+        let recording = runs.map(|run| run.join("recording.mcap")).find(|recording| recording.is_file());
         let mut recorded = 0;
-        for entry in tactus_record::read(run.path().join("recording.mcap"))? {
+        for entry in tactus_record::read(recording.with_context(|| format!("rig {rig} has no recording"))?)? {
             if let Entry::Message { message: Message::Frame(frame), .. } = entry? {
                 recorded += u64::from((of.first..=of.last).contains(&frame.seq));
             }
         }
-        missing += of.last + 1 - of.first - recorded;
+        missing += of.lacks(recorded);
     }
     Ok(missing)
 }

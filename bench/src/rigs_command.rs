@@ -19,6 +19,9 @@ pub(crate) struct RigsArgs {
     /// Start a run on every rig: each has a recording then, and a process for its script beside the service.
     #[arg(long)]
     record: bool,
+    /// Let the devices of this many rigs die in the middle: what is counted is the others'.
+    #[arg(long, value_name = "RIGS", default_value_t = 0)]
+    dying: usize,
     /// Length of each measurement in s.
     #[arg(long, default_value_t = 10.0)]
     seconds: f64,
@@ -35,7 +38,7 @@ pub(crate) struct RigsArgs {
 
 impl RigsArgs {
     pub(crate) fn run(&self) -> Result<()> {
-        ensure!(self.rigs.iter().all(|rigs| *rigs > 0), "a service has at least one rig");
+        ensure!(self.rigs.iter().all(|rigs| *rigs > self.dying), "at least one rig has to live");
         if !self.json {
             println!(
                 "{:>6}{:>12}{:>8}{:>12}{:>10}{:>7}{:>13}{:>13}{:>9}",
@@ -87,6 +90,7 @@ impl RigsArgs {
             rigs,
             time: Duration::try_from_secs_f64(self.seconds)?,
             is_recording: self.record,
+            dying: self.dying,
             cores: self.cores.clone(),
         };
         let measured = trial.measure()?;
@@ -95,14 +99,23 @@ impl RigsArgs {
     }
 
     fn print(&self, measured: &RigsMeasured, before: Option<RigsMeasured>) {
-        let RigsMeasured { rigs, frames_per_s, missed, unrecorded, frame_us, cores, memory_kib, threads } =
-            *measured;
+        let RigsMeasured {
+            rigs,
+            whole_rigs,
+            frames_per_s,
+            missed,
+            unrecorded,
+            frame_us,
+            cores,
+            memory_kib,
+            threads,
+        } = *measured;
         let per_rig_kib = before
             .filter(|before| before.rigs < rigs)
             .map(|before| (memory_kib as f64 - before.memory_kib as f64) / (rigs - before.rigs) as f64);
         if self.json {
             let line = json!({
-                "rigs": rigs, "frames_per_s": frames_per_s, "missed": missed, "unrecorded": unrecorded,
+                "rigs": rigs, "whole_rigs": whole_rigs, "frames_per_s": frames_per_s, "missed": missed, "unrecorded": unrecorded,
                 "frame_us": frame_us, "cores": cores, "memory_kib": memory_kib, "kib_per_rig": per_rig_kib,
                 "threads": threads, "version": env!("CARGO_PKG_VERSION"),
             });

@@ -5,7 +5,7 @@ use std::io::{self, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -37,6 +37,8 @@ const BASELINE_COUNTS: u16 = 100;
 pub(super) struct Devices {
     /// Addresses of each rig's sensor and stage.
     pub(super) addresses: Vec<[String; 2]>,
+    /// So many of the first rigs have no devices any more.
+    dead: Arc<AtomicUsize>,
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -47,6 +49,7 @@ struct Server {
     ports: Vec<Port>,
     /// When each port's device has something to do.
     wakes: Vec<Option<Instant>>,
+    dead: Arc<AtomicUsize>,
     ends: Arc<AtomicBool>,
 }
 
@@ -72,11 +75,12 @@ struct Sensor {
 impl Devices {
     /// Serves a sensor and the stage of each rig at ports of their own on loopback.
     pub(super) fn start(stages: Vec<VirtualStage>) -> Result<Self> {
-        let ends = Arc::<AtomicBool>::default();
+        let (dead, ends) = (Arc::<AtomicUsize>::default(), Arc::<AtomicBool>::default());
         let mut server = Server {
             epoll: epoll::create(CreateFlags::CLOEXEC)?,
             ports: Vec::new(),
             wakes: Vec::new(),
+            dead: Arc::clone(&dead),
             ends: Arc::clone(&ends),
         };
         let mut addresses = Vec::new();
@@ -85,7 +89,12 @@ impl Devices {
             addresses.push([sensor, server.listen(Device::Stage(Box::new(stage)))?]);
         }
         let thread = thread::Builder::new().name("devices".into()).spawn(move || server.serve())?;
-        Ok(Self { addresses, ends, thread: Some(thread) })
+        Ok(Self { addresses, dead, ends, thread: Some(thread) })
+    }
+
+    /// Both devices of the first rigs hang up, and take no call any more.
+    pub(super) fn kill(&self, rigs: usize) {
+        self.dead.store(rigs, Ordering::Relaxed);
     }
 }
 
@@ -118,6 +127,10 @@ impl Server {
                 return;
             }
             self.attend_until(began + slot * number);
+            let dead = self.dead();
+            for port in self.ports.iter_mut().take(dead) {
+                port.line = None;
+            }
             self.send_frames(number, slot * number);
             self.wake_stages(Instant::now());
         }
@@ -145,10 +158,17 @@ impl Server {
         }
     }
 
+    /// Number of the first ports whose device is dead.
+    fn dead(&self) -> usize {
+        2 * self.dead.load(Ordering::Relaxed)
+    }
+
     fn attend(&mut self, number: usize, is_line: bool) {
+        let is_dead = number < self.dead();
         let Some(port) = self.ports.get_mut(number) else { return };
         if !is_line {
-            port.line = port.accept(&self.epoll, number).ok();
+            // Whoever calls a dead one is hung up on.
+            port.line = port.accept(&self.epoll, number).ok().filter(|_| !is_dead);
             return;
         }
         if !port.hear() {

@@ -23,6 +23,9 @@ use crate::{BusError, command::drop_on_blocking_thread, queue::Queue};
 /// Queries that can wait for a reply.
 const WAITING_HISTORY_QUERIES: usize = 64;
 
+/// Messages that are copied for a client at a time: who publishes waits no longer than that takes.
+const COPIED_AT_ONCE: usize = 64;
+
 /// Messages that are kept of one topic, in bytes; the last one is kept in any case.
 const KEPT_BYTES_MAX: usize = 4 << 20;
 
@@ -109,11 +112,20 @@ impl KeptMessages {
         self.next = self.next.wrapping_add(1);
     }
 
-    /// The messages numbered within the range, at most the last `limit`.
-    fn find(&self, numbers: &RangeInclusive<u32>, limit: usize) -> Vec<(u32, ZBytes)> {
-        let wanted = || self.messages.iter().filter(|(number, _)| numbers.contains(number));
-        let spare = wanted().count().saturating_sub(limit);
-        wanted().skip(spare).cloned().collect()
+    /// The first of the messages numbered within the range, of at most the last `limit`, and how many they are.
+    fn first(&self, numbers: &RangeInclusive<u32>, limit: usize) -> Option<(u32, usize)> {
+        let wanted = || self.messages.iter().map(|(number, _)| *number).filter(|of| numbers.contains(of));
+        let count = wanted().count();
+        Some((wanted().nth(count.saturating_sub(limit))?, count.min(limit)))
+    }
+
+    /// From the message of this number on, or the oldest that is left: the next ones within the range, at most `count`.
+    fn from(&self, number: u32, numbers: &RangeInclusive<u32>, count: usize) -> Vec<(u32, ZBytes)> {
+        let oldest = self.messages.front().map_or(number, |(oldest, _)| *oldest);
+        let at = usize::try_from(number.wrapping_sub(oldest)).unwrap_or(usize::MAX);
+        let skipped = if at <= self.messages.len() { at } else { 0 };
+        let next = self.messages.iter().skip(skipped).filter(|(number, _)| numbers.contains(number));
+        next.take(count).cloned().collect()
     }
 }
 
@@ -129,16 +141,22 @@ impl HistoryQuery {
     pub(crate) fn answer(self) {
         let Self { query, kept, source } = self;
         let (numbers, limit) = wanted(query.parameters().get("_sn"), query.parameters().get("_max"));
-        let found = kept.lock().unwrap_or_else(PoisonError::into_inner).find(&numbers, limit);
-        for (number, payload) in found {
-            let sent = query
-                .reply(&source.key, payload)
-                .encoding(source.encoding.clone())
-                .source_info(SourceInfo::new(source.publisher, number))
-                .wait();
-            if let Err(error) = sent {
-                tracing::debug!(key = source.key, %error, "a client that asked for history disconnected");
-                return;
+        let lock = || kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some((mut next, mut left)) = lock().first(&numbers, limit) else { return };
+        while left > 0 {
+            let found = lock().from(next, &numbers, left.min(COPIED_AT_ONCE));
+            let Some((last, _)) = found.last() else { return };
+            (next, left) = (last.wrapping_add(1), left - found.len());
+            for (number, payload) in found {
+                let sent = query
+                    .reply(&source.key, payload)
+                    .encoding(source.encoding.clone())
+                    .source_info(SourceInfo::new(source.publisher, number))
+                    .wait();
+                if let Err(error) = sent {
+                    tracing::debug!(key = source.key, %error, "a client that asked for history disconnected");
+                    return;
+                }
             }
         }
     }

@@ -1,4 +1,23 @@
+use std::ops::RangeInclusive;
+
+use zenoh::bytes::ZBytes;
+
 use super::{KeptMessages, wanted};
+
+const ALL: RangeInclusive<u32> = 0..=u32::MAX;
+
+/// The messages that a client would get, copied two at a time.
+fn found(kept: &KeptMessages, numbers: &RangeInclusive<u32>, limit: usize) -> Vec<(u32, ZBytes)> {
+    let Some((mut next, mut left)) = kept.first(numbers, limit) else { return Vec::new() };
+    let mut all = Vec::new();
+    while left > 0 {
+        let some = kept.from(next, numbers, left.min(2));
+        next = some.last().unwrap().0.wrapping_add(1);
+        left -= some.len();
+        all.extend(some);
+    }
+    all
+}
 
 /// The numbers found after this many messages, of which the last `capacity` are kept.
 fn check(published: u32, capacity: usize, numbers: Option<&str>, limit: Option<&str>) -> Vec<u32> {
@@ -7,7 +26,7 @@ fn check(published: u32, capacity: usize, numbers: Option<&str>, limit: Option<&
         kept.push(number.to_le_bytes().into());
     }
     let (numbers, limit) = wanted(numbers, limit);
-    let found = kept.find(&numbers, limit);
+    let found = found(&kept, &numbers, limit);
     for (number, payload) in &found {
         assert_eq!(*payload.to_bytes(), number.to_le_bytes(), "the number belongs to the message");
     }
@@ -50,10 +69,31 @@ fn the_kept_messages_are_bounded_in_bytes_and_the_last_is_kept_in_any_case() {
     for _ in 0..40 {
         kept.push(vec![0; 1 << 20].into());
     }
-    assert_eq!(kept.find(&(0..=u32::MAX), usize::MAX).len(), 4);
+    assert_eq!(found(&kept, &ALL, usize::MAX).len(), 4);
     kept.push(vec![0; 20 << 20].into());
-    let all = kept.find(&(0..=u32::MAX), usize::MAX);
+    let all = found(&kept, &ALL, usize::MAX);
     assert_eq!(all.iter().map(|(number, _)| *number).collect::<Vec<_>>(), [40]);
     kept.push(vec![0; 1].into());
-    assert_eq!(kept.find(&(0..=u32::MAX), usize::MAX).len(), 1);
+    assert_eq!(found(&kept, &ALL, usize::MAX).len(), 1);
+}
+
+/// Between two copies the publisher goes on.
+#[test]
+fn messages_that_gave_way_meanwhile_are_passed_over() {
+    let mut kept = KeptMessages::new(4);
+    (0..6_u8).for_each(|byte| kept.push(vec![byte].into()));
+    let numbers = |found: Vec<(u32, ZBytes)>| found.into_iter().map(|(number, _)| number).collect::<Vec<_>>();
+    assert_eq!(kept.first(&ALL, usize::MAX), Some((2, 4)));
+    assert_eq!(numbers(kept.from(2, &ALL, 2)), [2, 3]);
+    (6..9_u8).for_each(|byte| kept.push(vec![byte].into()));
+    assert_eq!(numbers(kept.from(4, &ALL, 2)), [5, 6]);
+    assert_eq!(numbers(kept.from(9, &ALL, 2)), [0; 0]);
+}
+
+#[test]
+fn numbers_begin_anew_after_the_greatest() {
+    let mut kept = KeptMessages { next: u32::MAX - 1, ..KeptMessages::new(10) };
+    (0..4_u8).for_each(|byte| kept.push(vec![byte].into()));
+    let numbers: Vec<u32> = found(&kept, &ALL, usize::MAX).iter().map(|(number, _)| *number).collect();
+    assert_eq!(numbers, [u32::MAX - 1, u32::MAX, 0, 1]);
 }
