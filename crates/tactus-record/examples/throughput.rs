@@ -1,7 +1,7 @@
 //! How many frames per second this machine records, beside the bare `mcap` crate with the same messages, chunks and compression:
 //! `cargo run --profile dist -p tactus-record --example throughput [FRAMES [FOLDER]]`. Prints one JSON object.
 //!
-//! Both hand each chunk of half a second to the system. `_synced` is with one `fdatasync` for every second of frames, as the service does.
+//! Both hand each chunk of half a second to the system. `_synced` is with one `fdatasync` for every second of frames, twice as often as the service's.
 
 #![allow(clippy::print_stdout, reason = "a program for people")]
 

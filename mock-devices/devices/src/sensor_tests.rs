@@ -1,8 +1,9 @@
+use tactus_schema::Rig;
 use tactus_wire::weiss::{DecodedFrame, Decoder, Packet, acquire, query_controller, query_matrix};
 
 use super::*;
 use crate::faults::LinkFault;
-use crate::test_bench::{DeviceBench, sim_rig};
+use crate::test_bench::{DeviceBench, SIM_RIG, sim_rig};
 
 fn switched_on(seed: u64) -> DeviceBench<VirtualSensor> {
     speaking(&SensorCodec::default(), seed)
@@ -88,6 +89,27 @@ fn frames_are_sampled_on_an_exact_grid() {
         assert_eq!(sampled_ms, k * 1000 / 30);
         let since_start = *at - start + Duration::from_millis(100);
         assert!(since_start.abs_diff(Duration::from_secs(1) * k / 30) < Duration::from_micros(1));
+    }
+}
+
+#[test]
+fn no_sampling_is_passed_over_at_1_and_5_khz() {
+    for rate_hz in [1_000_u16, 5_000] {
+        let rig = SIM_RIG.replace("rate_hz = 30.0", &format!("rate_hz = {rate_hz}.0"));
+        let rig = Rig::from_toml(&rig).unwrap();
+        let sensor = |world, now| VirtualSensor::new(world, &SensorCodec::default(), now);
+        let mut bench = DeviceBench::new(&rig, 1, sensor);
+        bench.bytes(100);
+        bench.send(&acquire(true, false, rate_hz));
+        bench.bytes(0);
+        let start = bench.now;
+        let chunks = bench.chunks(Duration::from_secs(2));
+        assert_eq!(chunks.len(), 2 * usize::from(rate_hz));
+        for (k, (at, bytes)) in (1_u32..).zip(&chunks) {
+            assert_eq!(timestamps_ms(bytes).len(), 1, "one frame at a time");
+            let due = start + Duration::from_secs(1) * k / rate_hz.into();
+            assert!(at.max(&due).duration_since(*at.min(&due)) < Duration::from_micros(1), "frame {k}");
+        }
     }
 }
 

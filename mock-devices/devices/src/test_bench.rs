@@ -10,8 +10,10 @@ use crate::cable::Device;
 use crate::truth::Truth;
 use crate::world::{SharedWorld, World};
 
+pub(crate) const SIM_RIG: &str = include_str!("../../../config/rigs/sim.toml");
+
 pub(crate) fn sim_rig() -> Rig {
-    Rig::from_toml(include_str!("../../../config/rigs/sim.toml")).unwrap()
+    Rig::from_toml(SIM_RIG).unwrap()
 }
 
 pub(crate) fn world_of(rig: &Rig, seed: u64) -> SharedWorld {
