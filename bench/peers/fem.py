@@ -13,7 +13,6 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS
 
 import argparse
 import json
-import platform
 import shutil
 import statistics
 import subprocess
@@ -22,10 +21,11 @@ import time
 from pathlib import Path
 
 import numpy as np
-import scipy
 import skfem
 from scipy.sparse.linalg import LinearOperator, cg, spsolve
 from skfem.helpers import ddot, div, sym_grad, trace
+
+import machine
 
 REPOSITORY = Path(__file__).parents[2]
 # Unknowns up to which scikit-fem's equations are factorised; beyond, fill is out of hand and gradients are conjugate.
@@ -36,7 +36,7 @@ def main():
     args = arguments()
     results = [result for mesh in args.meshes for nu in args.poisson_ratios for result in compare(args, mesh, nu)]
     if args.json:
-        print(json.dumps({"machine": machine(), "versions": versions(), "results": results}, indent=1))
+        print(json.dumps({"machine": machine.machine(), "versions": versions(), "results": results}, indent=1))
     else:
         print_table(results)
     if args.within is not None:
@@ -179,13 +179,8 @@ def solved(stiffness, load):
 PEERS = {"CalculiX": (calculix, True), "scikit-fem": (scikit_fem, False)}
 
 
-def machine():
-    names = [line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")]
-    return f"{names[0] if names else platform.processor()}, {os.cpu_count()} cores, Python {platform.python_version()}"
-
-
 def versions():
-    said = {"scikit-fem": skfem.__version__, "numpy": np.__version__, "scipy": scipy.__version__}
+    said = machine.versions("scikit-fem", "numpy", "scipy")
     if shutil.which("ccx"):
         ccx = subprocess.run(["ccx", "-v"], capture_output=True, text=True)
         said["CalculiX"] = ccx.stdout.split()[-1]
@@ -193,7 +188,7 @@ def versions():
 
 
 def print_table(results):
-    print(machine() + "; " + ", ".join(f"{who} {version}" for who, version in versions().items()))
+    print(machine.machine() + "; " + ", ".join(f"{who} {version}" for who, version in versions().items()))
     print(
         f"{'bricks':<16}{'nu':>6}  {'who':<12}{'sides':<9}{'time, s':>10}{'of':>4}{'tactus, ms':>12}{'to tactus':>12}"
         f"{'peak, N':>10}{'difference':>12}"

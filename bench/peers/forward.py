@@ -12,7 +12,6 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS
 import argparse
 import json
 import multiprocessing
-import platform
 import statistics
 import subprocess
 import time
@@ -20,9 +19,10 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import scipy
 from scipy.ndimage import gaussian_filter
 from scipy.special import erf
+
+import machine
 
 REPOSITORY = Path(__file__).parents[2]
 ARRAYS = ("digitacts", "fingertip", "tekscan-5027")
@@ -41,7 +41,7 @@ def main():
     args = arguments()
     results = [result for array in args.arrays for result in compare(args, array)]
     if args.json:
-        print(json.dumps({"machine": machine(), "versions": versions(results), "results": results}, indent=1))
+        print(json.dumps({"machine": machine.machine(), "versions": versions(results), "results": results}, indent=1))
     else:
         print_table(results)
 
@@ -371,20 +371,13 @@ def within_h(points_mm):
     return distance * inside
 
 
-def machine():
-    with open("/proc/cpuinfo") as cpuinfo:
-        model = next(line.split(":")[1].strip() for line in cpuinfo if line.startswith("model name"))
-    return f"{os.cpu_count()} x {model}, {platform.system()}"
-
-
 def versions(results):
     ours = next(result["version"] for result in results if "version" in result)
-    modules = {module.__name__: module.__version__ for module in (mujoco, np, scipy)}
-    return {"tactus": ours, "python": platform.python_version(), **modules}
+    return {"tactus": ours, **machine.versions("mujoco", "numpy", "scipy")}
 
 
 def print_table(results):
-    print(machine() + "; " + ", ".join(f"{who} {version}" for who, version in versions(results).items()))
+    print(machine.machine() + "; " + ", ".join(f"{who} {version}" for who, version in versions(results).items()))
     print(f"{'array':<14}{'who':<23}{'1 core/s':>11}{'2 cores/s':>11}{'to MuJoCo':>11}{'error':>9}  included")
     for result in results:
         error = "-" if result["error"] is None else f"{result['error']:.0e}"

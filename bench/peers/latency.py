@@ -14,7 +14,6 @@ import atexit
 import binascii
 import json
 import os
-import platform
 import resource
 import socket
 import statistics
@@ -25,6 +24,8 @@ import threading
 import time
 import tty
 from pathlib import Path
+
+import machine
 
 REPOSITORY = Path(__file__).parents[2]
 FIRST_READINGS = 4000
@@ -37,7 +38,7 @@ def main():
     args = arguments()
     if args.part:
         return PARTS[args.part](*args.rest)
-    result = {"machine": f"{os.cpu_count()} cores, {platform.machine()}", "python": platform.python_version(), "rows": []}
+    result = {"machine": machine.described("pyserial", "pyzmq", "pylsl"), "rows": []}
     for rate_hz, seconds in ((30, args.seconds), (1000, args.seconds / 3)):
         for busy in (False, True):
             loads = [begin([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() * busy)]
@@ -289,7 +290,7 @@ START = {"tactus": start_tactus, "zenoh": start_zenoh, "zmq": python_pair("zmq")
 
 
 def table(result):
-    lines = [f"{result['machine']}, Python {result['python']}"]
+    lines = [result["machine"]]
     lines.append(f"{'rate':>7} {'load':<5} {'who':<7} {'p50 ms':>8} {'p99 ms':>8} {'p99.9 ms':>9} {'lost':>5} {'% core':>7} {'MiB':>6} {'p50 to zenoh':>13}")
     for row in result["rows"]:
         same = [one for one in result["rows"] if (one["rate_hz"], one["busy"]) == (row["rate_hz"], row["busy"])]

@@ -16,6 +16,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from machine import described
+
 REPOSITORY = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 
@@ -45,8 +47,9 @@ def main():
         for who, rounds in ways.items():
             ways[who] = {key: statistics.median(one[key] for one in rounds) for key in rounds[0]}
     if args.json:
-        print(json.dumps(result, indent=1))
+        print(json.dumps({"machine": described("bluesky", "ophyd"), "works": result}, indent=1))
         return
+    print(described("bluesky", "ophyd"))
     print(f"{'what':<10}{'who':<14}{'done':>9}{'s':>9}{'a second':>12}{'to bluesky':>12}")
     for work, ways in result.items():
         for who, one in ways.items():
@@ -62,7 +65,11 @@ def tactus(binary, work, command, *options):
         seconds = time.perf_counter() - start
     if ended.returncode:
         raise SystemExit(ended.stderr)
-    done = done or json.loads(ended.stdout)["presses"]
+    told = json.loads(ended.stdout)
+    done = done or told["presses"]
+    # A run of points has at least a frame for each.
+    if told["exit_status"] != "done" or told.get("frames", done) < done:
+        raise SystemExit(f"{script}: {ended.stdout}")
     return {"done": done, "s": seconds, "per_s": done / seconds}
 
 

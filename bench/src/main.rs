@@ -15,7 +15,7 @@ use rigs_command::RigsArgs;
 use serde_json::json;
 use tactus_bench::{
     Acuity, COVERING, Calibration, Fem, Forward, Growth, Kernel, MachineLimits, Method, Painter, Pose, Sweep,
-    Tool, latency, model, poses,
+    Tool, latency, model, poses, serve_devices,
 };
 use tactus_bus::Endpoint;
 use tactus_calibrate::acuity::Grid;
@@ -125,6 +125,12 @@ enum Part {
     },
     /// How many rigs one service carries: memory of a rig, processor time of a frame, frames lost.
     Rigs(RigsArgs),
+    /// Serves the devices of so many rigs at sockets of loopback, for `peers/capacity.py`: prints the sensors' addresses as JSON, and ends with its
+    /// standard input.
+    Devices {
+        /// Number of rigs.
+        rigs: usize,
+    },
     /// How well `tactus discover` finds and names hidden physics.
     Evidence(EvidenceArgs),
     /// How well `tactus calibrate` recovers the parameters of simulated rigs; continues an interrupted run. Workers that have the same folder
@@ -152,6 +158,11 @@ fn main() -> Result<()> {
             println!("{}", serde_json::to_string(&hear(&endpoint, frames, ready)?)?);
         }
         Part::Relay { device, endpoint } => latency::relay(&device, &endpoint, ready)?,
+        Part::Devices { rigs } => {
+            let devices = serve_devices(rigs)?;
+            println!("{}", json!(devices.sensors()));
+            std::io::copy(&mut std::io::stdin(), &mut std::io::sink())?;
+        }
         Part::Rigs(args) => args.run()?,
         Part::Evidence(args) => args.run()?,
         Part::Truth(args) => args.run()?,

@@ -28,7 +28,7 @@ use tokio::task::JoinSet;
 use tokio::time::{Instant as TokioInstant, sleep, timeout};
 use zenoh::Session;
 
-use devices::Devices;
+pub use devices::Devices;
 
 /// Rate of every sensor.
 const RATE_HZ: f64 = 30.0;
@@ -109,6 +109,17 @@ struct Service {
     folder: tempfile::TempDir,
 }
 
+/// Serves a sensor and a stage of each rig.
+///
+/// # Errors
+/// If the system provides no sockets, or no thread.
+pub fn serve_devices(rigs: usize) -> Result<Devices> {
+    let RigFiles { rig, codec, .. } = simulated_rig()?;
+    let truth = |number| Truth::of_rig(&rig, number);
+    let stage = |number| start_devices(truth(number), rig.covering, &codec, TokioInstant::now()).stage;
+    Devices::start((0..rigs as u64).map(stage).collect())
+}
+
 impl RigsTrial {
     /// Starts devices and service, measures, and ends both.
     ///
@@ -124,11 +135,9 @@ impl RigsTrial {
     async fn run(&self) -> Result<RigsMeasured> {
         let folder = tempfile::tempdir()?;
         let names: Vec<_> = (0..self.rigs).map(|number| format!("r{number:05}")).collect();
-        let RigFiles { rig, codec, texts, .. } = simulated_rig()?;
+        let RigFiles { texts, .. } = simulated_rig()?;
         fs::create_dir(folder.path().join("rigs"))?;
-        let truth = |number| Truth::of_rig(&rig, number);
-        let stage = |number| start_devices(truth(number), rig.covering, &codec, TokioInstant::now()).stage;
-        let devices = Devices::start((0..self.rigs as u64).map(stage).collect())?;
+        let devices = serve_devices(self.rigs)?;
         for (name, [sensor, stage]) in names.iter().zip(&devices.addresses) {
             let text = texts.rig_toml.replace("name = \"sim\"", &format!("name = \"{name}\""));
             let text = at(&at(&text, sensor), stage);

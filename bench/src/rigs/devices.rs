@@ -34,7 +34,7 @@ const BASELINE_COUNTS: u16 = 100;
 
 /// Devices that are served until this is dropped.
 #[derive(Debug)]
-pub(super) struct Devices {
+pub struct Devices {
     /// Addresses of each rig's sensor and stage.
     pub(super) addresses: Vec<[String; 2]>,
     /// So many of the first rigs have no devices any more.
@@ -90,6 +90,11 @@ impl Devices {
         }
         let thread = thread::Builder::new().name("devices".into()).spawn(move || server.serve())?;
         Ok(Self { addresses, dead, ends, thread: Some(thread) })
+    }
+
+    /// Addresses of the sensors.
+    pub fn sensors(&self) -> Vec<&str> {
+        self.addresses.iter().map(|[sensor, _]| sensor.as_str()).collect()
     }
 
     /// Both devices of the first rigs hang up, and take no call any more.

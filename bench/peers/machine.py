@@ -1,0 +1,24 @@
+"""What a figure was measured on."""
+
+import datetime
+import importlib.metadata
+import os
+import platform
+
+
+def machine():
+    """The day, the processor and its cores."""
+    with open("/proc/cpuinfo") as cpuinfo:
+        models = [line.split(":")[1].strip() for line in cpuinfo if line.startswith("model name")]
+    model = models[0] if models else platform.machine()
+    return f"{datetime.date.today()}, {model}, {os.cpu_count()} cores, {platform.system()}"
+
+
+def versions(*packages):
+    """Of Python and of installed packages."""
+    return {"python": platform.python_version(), **{package: importlib.metadata.version(package) for package in packages}}
+
+
+def described(*packages):
+    """Both in a line."""
+    return f"{machine()}; " + ", ".join(f"{who} {version}" for who, version in versions(*packages).items())
