@@ -245,8 +245,11 @@ bench:
     cargo run --profile dist --package tactus-bench -- limits
     cargo run --profile dist --package tactus-bench -- acuity
 
-# The same beside others' programs, as compiled for any processor: all choose their instructions when they run.
-bench-peers *arguments: bench-peers-tools
+# All that is compared with others' programs, but for finite elements, calibration and discovery, which have recipes of their own.
+bench-peers: bench-forward bench-service bench-rigs
+
+# The forward model beside others' programs, as compiled for any processor: all choose their instructions when they run.
+bench-forward *arguments: bench-peers-tools
     cargo build --profile dist --package tactus-bench
     {{ tools }}/peers/bin/python bench/peers/forward.py {{ arguments }}
 
@@ -264,10 +267,13 @@ bench-service-tools:
     test -d {{ tools }}/service || python3 -m venv {{ tools }}/service
     {{ tools }}/service/bin/pip install --quiet --requirement bench/peers/service-requirements.txt
 
-# How many rigs one service carries: memory and processor time of each, then more and more until a frame is lost. docs/scale.md.
-bench-rigs *arguments="1,50,100 --record --search 3":
+# How many rigs one service carries: memory and processor time of each, then more and more until a frame is lost; what the death of twenty is
+# to others; and how many sensors one Python process carries. docs/scale.md.
+bench-rigs *arguments="1,50,100 --record --search 3": bench-service-tools
     cargo build --profile dist --package tactus-daemon --package tactus-bench
     target/dist/tactus-bench rigs {{ arguments }}
+    target/dist/tactus-bench rigs 200 --record --dying 20
+    {{ tools }}/service/bin/python bench/peers/capacity.py
 
 # A fleet of synthetic runs in growing sizes: rows/s, memory, bytes. docs/scale.md.
 bench-fleet *arguments: fleet-tools

@@ -69,6 +69,9 @@ pub fn nothing_open(found: &Discovery) -> &'static str {
     }
 }
 
+/// Effects of the tool's face: under a small one they are smaller than the covering spreads.
+const NEED_A_WIDE_TOOL: [&str; 2] = ["indenter-size", "indenter-tilt"];
+
 /// Such as `No experiment would distinguish backlash from hysteresis: ...`.
 pub fn open(question: &OpenQuestion) -> String {
     let [one, other] = &question.separates;
@@ -83,7 +86,8 @@ pub fn open(question: &OpenQuestion) -> String {
         },
     );
     if other == "nothing" {
-        format!("No experiment would show a small {one}: {why}.")
+        let wider = if NEED_A_WIDE_TOOL.contains(&one.as_str()) { "; a wider indenter would show more" } else { "" };
+        format!("No experiment would show a small {one}: {why}{wider}.")
     } else {
         format!("No experiment would distinguish {one} from {other}: {why}.")
     }
