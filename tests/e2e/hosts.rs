@@ -235,10 +235,14 @@ fn assert_the_dashboard_shows_frames(web: &mut Process) {
     // Only a hang takes a minute.
     socket.set_read_timeout(Some(Duration::from_mins(1))).unwrap();
     write!(socket, "GET /live HTTP/1.0\r\nHost: {address}\r\n\r\n").unwrap();
-    let lines: Vec<String> = BufReader::new(socket).lines().map_while(Result::ok).scan(0, |frames, line| {
-        *frames += usize::from(line == "event: frame");
-        (*frames <= 3).then_some(line)
-    }).collect();
+    let lines: Vec<String> = BufReader::new(socket)
+        .lines()
+        .map_while(Result::ok)
+        .scan(0, |frames, line| {
+            *frames += usize::from(line == "event: frame");
+            (*frames <= 3).then_some(line)
+        })
+        .collect();
     let frames = lines.windows(2).filter(|pair| pair[0] == "event: frame");
     let seqs: Vec<u64> = frames
         .map(|pair| {

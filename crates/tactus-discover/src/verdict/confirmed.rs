@@ -8,8 +8,8 @@ use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Fitted, FoldsOf, Prepared, Problem, Term, gains_by_folds};
 use crate::progress::Stage;
 use crate::search::{
-    Equivalent, FLIPS, Formed, POLISH_ROUNDS, Partners, Refuted, RefutedFormula, Search, names, q_values, sign_flip_p,
-    without,
+    Equivalent, FLIPS, Formed, POLISH_ROUNDS, Partners, Refuted, RefutedFormula, Search, names, q_values,
+    sign_flip_p, without,
 };
 
 /// An effect is confirmed if noise alone would let it gain as much, on fitted presses that its parameters have not seen, with at most this

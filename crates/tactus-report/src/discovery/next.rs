@@ -86,7 +86,8 @@ pub fn open(question: &OpenQuestion) -> String {
         },
     );
     if other == "nothing" {
-        let wider = if NEED_A_WIDE_TOOL.contains(&one.as_str()) { "; a wider indenter would show more" } else { "" };
+        let wider =
+            if NEED_A_WIDE_TOOL.contains(&one.as_str()) { "; a wider indenter would show more" } else { "" };
         format!("No experiment would show a small {one}: {why}{wider}.")
     } else {
         format!("No experiment would distinguish {one} from {other}: {why}.")
