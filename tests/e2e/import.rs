@@ -342,6 +342,7 @@ fn a_new_mapping_asks_what_names_do_not_say() {
     // Every question left open is an error that names its key; complete, it imports.
     let told = tactus(folder.path(), &["import", "--map", "new.toml", "bench.csv"]);
     assert!(told.code == Some(1) && told.err.contains("z.direction: missing"), "{told:?}");
+    assert!(told.err.contains("begin with #? and are still to be completed"), "{told:?}");
     let answered = proposed
         .replace("#? ", "")
         .replace("direction = 1 ", "direction = -1 ")

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use serde_json::json;
-use tactus_import::Summary;
+use tactus_import::{ImportError, Summary};
 
 use crate::cli::{Common, ImportArgs};
 use crate::exit::{Exit, Failure};
@@ -17,8 +17,9 @@ pub(crate) fn import(common: &Common, args: &ImportArgs) -> anyhow::Result<Exit>
         (Some(map), None) => {
             let out = args.out.clone().unwrap_or_else(|| args.files[0].with_extension("parquet"));
             let busy = Busy::with("reading", common.json);
-            let summary = busy.reads(|| tactus_import::import(map, &args.files, out))?;
+            let imported = busy.reads(|| tactus_import::import(map, &args.files, out));
             drop(busy);
+            let summary = imported.map_err(|error| with_open_questions(error, map))?;
             Ok(told(common, &summary))
         }
         (None, Some(map)) => propose(common, &args.files[0], map),
@@ -30,13 +31,30 @@ pub(crate) fn import(common: &Common, args: &ImportArgs) -> anyhow::Result<Exit>
     }
 }
 
+/// The error, and how many questions of the mapping nobody has answered: the first of them may be its cause, and the next one's.
+fn with_open_questions(error: ImportError, map: &Path) -> anyhow::Error {
+    // A mapping that cannot be read is the error itself.
+    match fs::read_to_string(map).map_or(0, |text| questions(&text)) {
+        0 => error.into(),
+        open => {
+            let open = format!("{open} of its lines begin with #? and are still to be completed");
+            anyhow::anyhow!("{error}; {}: {open}", map.display())
+        }
+    }
+}
+
+/// Lines that only the lab can complete.
+fn questions(mapping: &str) -> usize {
+    mapping.lines().filter(|line| line.starts_with("#?")).count()
+}
+
 fn propose(common: &Common, file: &Path, map: &Path) -> anyhow::Result<Exit> {
     if map.exists() {
         return Err(Failure::new(Exit::Usage, format!("{} exists: name another file", map.display())).into());
     }
     let text = tactus_import::propose(file)?;
     fs::write(map, &text).with_context(|| format!("cannot write {}", map.display()))?;
-    let asked = text.lines().filter(|line| line.starts_with("#?")).count();
+    let asked = questions(&text);
     if common.json {
         say(&json!({ "map": map, "asked": asked }).to_string());
     } else {
