@@ -22,6 +22,8 @@ from machine import described
 REPOSITORY = Path(__file__).parents[2]
 RATE_HZ = 30
 FRAME_BYTES = 109
+# Has a `weiss-dsa` controller send 30 frames a second, with its check sum.
+ACQUIRE = bytes.fromhex("aaaaaa030300801e008e1c")
 
 
 def main():
@@ -91,7 +93,7 @@ def passes(folder, port):
     for number, address in enumerate(json.loads((Path(folder) / "addresses.json").read_text())):
         host, _, its_port = address.rpartition(":")
         line = socket.create_connection((host, int(its_port)))
-        line.sendall(acquire())
+        line.sendall(ACQUIRE)
         line.setblocking(False)
         rig = [line, bytearray(), open(Path(folder) / f"{number}.bin", "wb", buffering=1 << 14), struct.pack("<I", number)]
         selector.register(line, selectors.EVENT_READ, rig)
@@ -143,18 +145,6 @@ def hears(port, seconds):
     lost = sum(round((last - first) * RATE_HZ / 1000) + 1 - count for first, last, count in seen.values())
     frames = sum(count for _, _, count in seen.values())
     print(json.dumps({"frames_per_s": frames / lasted_s, "lost": lost}))
-
-
-def acquire():
-    """The command that makes a `weiss-dsa` controller send frames."""
-    body = struct.pack("<BHBH", 3, 3, 0x80, RATE_HZ)
-    value = 0xFFFF
-    for byte in body:
-        entry = ((value ^ byte) & 0xFF) << 8
-        for _ in range(8):
-            entry = (entry << 1 ^ 0x1021 if entry & 0x8000 else entry << 1) & 0xFFFF
-        value = value >> 8 ^ entry
-    return b"\xaa\xaa\xaa" + body + struct.pack("<H", value)
 
 
 PARTS = {"passes": passes, "hears": hears}
