@@ -11,15 +11,15 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS
 
 import argparse
 import json
-import platform
 import statistics
 import subprocess
 import time
 from pathlib import Path
 
 import numpy as np
-import scipy
 from scipy.special import ndtr
+
+import machine
 
 REPOSITORY = Path(__file__).parents[2]
 EDGES = np.arange(-2, 4)
@@ -31,8 +31,8 @@ def main():
     args = arguments()
     rounds = [one_round(args.binary) for _ in range(args.rounds)]
     result = {
-        "machine": f"{os.cpu_count()} cores, {platform.processor() or platform.machine()}, {platform.system()}",
-        "versions": {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__},
+        "machine": machine.machine(),
+        "versions": machine.versions("numpy", "scipy"),
         **{key: statistics.median(one[key] for one in rounds) for key in rounds[0]},
     }
     for panel in ("locations", "separations", "both"):

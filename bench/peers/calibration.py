@@ -14,7 +14,6 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS
 
 import argparse
 import json
-import platform
 import statistics
 import subprocess
 import tempfile
@@ -22,10 +21,11 @@ import time
 from pathlib import Path
 
 import numpy as np
-import scipy
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtr
+
+import machine
 
 REPOSITORY = Path(__file__).parents[2]
 ELEMENT_MM = 1.8
@@ -47,7 +47,7 @@ def main():
     raster_s *= len(sweeps)
     spread_s, spread_one_core_s = (one["whole_s"] - one["without_sweeps_s"] for one in (ours, one_core))
     worst = max(abs(ours_sigma - sigma) for ours_sigma, sigma in zip((s["sigma_mm"] for s in sweeps), sigmas))
-    print(f"{os.cpu_count()} cores, {platform.system()}; python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}")
+    print(machine.described(machine.versions("numpy", "scipy")))
     print(f"presses: {ours['presses']}, of which sweeps {sum(len(s['places_mm']) for s in sweeps)}")
     print(f"reading the recordings            {ours['read_s']:8.3f} s")
     print(f"whole calibration                 {ours['whole_s']:8.3f} s, one core {one_core['whole_s']:.3f} s")

@@ -17,7 +17,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from machine import described
+from latency import free_port, used
+from machine import described, versions
 
 REPOSITORY = Path(__file__).parents[2]
 RATE_HZ = 30
@@ -35,7 +36,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=10)
     parser.add_argument("--halvings", type=int, default=3)
     args = parser.parse_args()
-    print(described("pyzmq", "numpy"))
+    print(described(versions("pyzmq", "numpy")))
     print(f"{'sensors':>8}{'frames/s':>10}{'lost':>7}{'cores':>7}")
     whole, broken = 0, None
     sensors = args.sensors
@@ -67,19 +68,13 @@ def measure(args, sensors):
         passes.stdout.readline()
         hears = subprocess.run([*me, "hears", port, str(args.seconds)], capture_output=True, text=True, check=True)
         # Its whole time; connecting is a small part of it.
-        stat = Path(f"/proc/{passes.pid}/stat").read_text().rpartition(")")[2].split()
+        spent_s = used(passes.pid)["cpu_s"]
         passes.kill()
         passes.wait()
     devices.stdin.close()
     devices.wait()
     heard = json.loads(hears.stdout)
-    return {**heard, "cores": sum(map(int, stat[11:13])) / 100 / (args.seconds * 1.5)}
-
-
-def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
+    return {**heard, "cores": spent_s / (args.seconds * 1.5)}
 
 
 def passes(folder, port):

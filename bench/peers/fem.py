@@ -188,7 +188,7 @@ def versions():
 
 
 def print_table(results):
-    print(machine.machine() + "; " + ", ".join(f"{who} {version}" for who, version in versions().items()))
+    print(machine.described(versions()))
     print(
         f"{'bricks':<16}{'nu':>6}  {'who':<12}{'sides':<9}{'time, s':>10}{'of':>4}{'tactus, ms':>12}{'to tactus':>12}"
         f"{'peak, N':>10}{'difference':>12}"

@@ -377,7 +377,7 @@ def versions(results):
 
 
 def print_table(results):
-    print(machine.machine() + "; " + ", ".join(f"{who} {version}" for who, version in versions(results).items()))
+    print(machine.described(versions(results)))
     print(f"{'array':<14}{'who':<23}{'1 core/s':>11}{'2 cores/s':>11}{'to MuJoCo':>11}{'error':>9}  included")
     for result in results:
         error = "-" if result["error"] is None else f"{result['error']:.0e}"

@@ -38,7 +38,7 @@ def main():
     args = arguments()
     if args.part:
         return PARTS[args.part](*args.rest)
-    result = {"machine": machine.described("pyserial", "pyzmq", "pylsl"), "rows": []}
+    result = {"machine": machine.described(machine.versions("pyserial", "pyzmq", "pylsl")), "rows": []}
     for rate_hz, seconds in ((30, args.seconds), (1000, args.seconds / 3)):
         for busy in (False, True):
             loads = [begin([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() * busy)]

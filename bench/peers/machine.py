@@ -19,6 +19,6 @@ def versions(*packages):
     return {"python": platform.python_version(), **{package: importlib.metadata.version(package) for package in packages}}
 
 
-def described(*packages):
+def described(versions):
     """Both in a line."""
-    return f"{machine()}; " + ", ".join(f"{who} {version}" for who, version in versions(*packages).items())
+    return f"{machine()}; " + ", ".join(f"{who} {version}" for who, version in versions.items())

@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from machine import described
+from machine import described, versions
 
 REPOSITORY = Path(__file__).parents[2]
 HERE = Path(__file__).parent
@@ -47,9 +47,9 @@ def main():
         for who, rounds in ways.items():
             ways[who] = {key: statistics.median(one[key] for one in rounds) for key in rounds[0]}
     if args.json:
-        print(json.dumps({"machine": described("bluesky", "ophyd"), "works": result}, indent=1))
+        print(json.dumps({"machine": described(versions("bluesky", "ophyd")), "works": result}, indent=1))
         return
-    print(described("bluesky", "ophyd"))
+    print(described(versions("bluesky", "ophyd")))
     print(f"{'what':<10}{'who':<14}{'done':>9}{'s':>9}{'a second':>12}{'to bluesky':>12}")
     for work, ways in result.items():
         for who, one in ways.items():

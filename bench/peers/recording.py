@@ -36,9 +36,9 @@ def main():
             rounds = [table(Path(folder) / "frames.h5", args.frames, sync) for _ in range(args.rounds)]
             ways[name] = {key: statistics.median(one[key] for one in rounds) for key in rounds[0]}
     if args.json:
-        print(json.dumps({"machine": machine.described("h5py", "numpy"), "frames": args.frames, "ways": ways}, indent=1))
+        print(json.dumps({"machine": machine.described(machine.versions("h5py", "numpy")), "frames": args.frames, "ways": ways}, indent=1))
         return
-    print(machine.described("h5py", "numpy"))
+    print(machine.described(machine.versions("h5py", "numpy")))
     print(f"{'who':<16}{'frames/s':>12}{'bytes/frame':>13}{'share of mcap':>15}")
     for name, way in sorted(ways.items()):
         bare = ways["mcap_synced" if name.endswith("_synced") else "mcap"]

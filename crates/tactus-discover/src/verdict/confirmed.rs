@@ -146,8 +146,8 @@ impl Search<'_> {
                     .zip(errors)
                     .enumerate()
                     .filter(|(parameter, ((known, value), _))| {
-                        let is_told = partners.as_ref().is_none_or(|partners| is_told(partners, term));
-                        if known.name == ANSWERS_FOR && !is_told {
+                        let is_untold = |partners| !is_told(partners, term);
+                        if known.name == ANSWERS_FOR && partners.as_ref().is_some_and(is_untold) {
                             return false;
                         }
                         // Beside a table, the others stay neutral.

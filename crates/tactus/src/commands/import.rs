@@ -8,7 +8,7 @@ use serde_json::json;
 use tactus_import::{ImportError, Summary};
 
 use crate::cli::{Common, ImportArgs};
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, in_words};
 use crate::output::{print_fields, say, say_next};
 use crate::progress::Busy;
 
@@ -38,7 +38,7 @@ fn with_open_questions(error: ImportError, map: &Path) -> anyhow::Error {
         0 => error.into(),
         open => {
             let open = format!("{open} of its lines begin with #? and are still to be completed");
-            anyhow::anyhow!("{error}; {}: {open}", map.display())
+            anyhow::anyhow!("{}; {}: {open}", in_words(&error.into()), map.display())
         }
     }
 }
