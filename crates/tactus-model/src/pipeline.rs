@@ -64,13 +64,15 @@ struct Stages {
     readout: Vec<Box<dyn OnReadout>>,
     /// The last stage with an effect that remembers.
     remember: Option<PipelineStage>,
+    /// True if a press at one place and depth may differ with time.
+    press_is_timed: bool,
 }
 
 /// The last contact and its signal at the elements.
 #[derive(Debug)]
 struct Pressed {
-    /// Position, rotation and depth; `None` if the image must be computed again.
-    at: Option<([f64; 2], f64, f64)>,
+    /// Position, rotation and depth, and the time if it matters; `None` if the image must be computed again.
+    at: Option<([f64; 2], f64, f64, Option<f64>)>,
     contact: Contact,
     loads: Vec<Load>,
     /// What the last press of each load leaves for the next.
@@ -238,7 +240,7 @@ impl Pipeline {
         let tip = self.place(moment, path);
         let base = BaseModel { model: &self.model, covering: self.covering };
         let ready = Ready { table: self.table.as_ref(), images: self.images.as_deref() };
-        self.pressed.press(&tip, &self.indenter, base, &self.stages, ready);
+        self.pressed.press(&tip, &self.indenter, moment.now(base), &self.stages, ready);
         for (signal, reached) in self.signal_mm.iter_mut().zip(&self.pressed.reached_mm) {
             *signal = self.stiffness * reached;
         }
@@ -291,7 +293,7 @@ impl Pipeline {
 
     /// Clears the history of every effect, and the time.
     pub fn reset(&mut self) {
-        let Stages { motion, contact: _, covering, element, readout, remember: _ } = &mut self.stages;
+        let Stages { motion, contact: _, covering, element, readout, .. } = &mut self.stages;
         for effect in motion {
             effect.reset();
         }
@@ -376,21 +378,24 @@ impl Stages {
             }
         }
         stages.remember = stages.last_that_remembers();
+        stages.press_is_timed = stages.contact.iter().any(|effect| effect.is_timed())
+            || stages.covering.iter().any(|effect| effect.spreads() && effect.is_timed());
         stages
     }
 
     /// True if a moment alone does not determine what they do.
     fn act_in_time(&self) -> bool {
-        let Self { motion, contact: _, covering, element, readout, remember } = self;
+        let Self { motion, contact, covering, element, readout, remember, press_is_timed: _ } = self;
         remember.is_some()
             || motion.iter().any(|effect| effect.is_timed())
+            || contact.iter().any(|effect| effect.is_timed())
             || covering.iter().any(|effect| effect.is_timed())
             || element.iter().any(|effect| effect.is_timed())
             || readout.iter().any(|effect| effect.is_timed())
     }
 
     fn last_that_remembers(&self) -> Option<PipelineStage> {
-        let Self { motion, contact: _, covering, element, readout, remember: _ } = self;
+        let Self { motion, contact: _, covering, element, readout, .. } = self;
         let stages = [
             (PipelineStage::Readout, readout.iter().any(|effect| effect.remembers())),
             (PipelineStage::Element, element.iter().any(|effect| effect.remembers())),
@@ -406,12 +411,14 @@ impl Pressed {
         &mut self,
         tip: &TipState,
         indenter: &Indenter,
-        base: BaseModel<'_>,
+        now: Now<'_>,
         stages: &Stages,
         Ready { table, images }: Ready<'_>,
     ) {
+        let base = now.base;
         let contact = tip.contact(indenter.clone());
-        let at = (contact.position_mm, contact.rotation_deg, contact.depth_mm);
+        let t_s = stages.press_is_timed.then_some(now.t_s);
+        let at = (contact.position_mm, contact.rotation_deg, contact.depth_mm, t_s);
         if self.at == Some(at) {
             return;
         }
@@ -419,8 +426,8 @@ impl Pressed {
         self.contact = contact;
         let mut lean = [0.0; 2];
         for effect in &stages.contact {
-            let [x, y] = effect.lean(&self.contact);
-            effect.touch(base, &mut self.contact);
+            let [x, y] = effect.lean(now, &self.contact);
+            effect.touch(now, &mut self.contact);
             lean = [lean[0] + x, lean[1] + y];
         }
         if lean.iter().any(|by| *by != 0.0) {
@@ -430,7 +437,7 @@ impl Pressed {
         let (contact, sigma_mm) = (self.contact.clone(), [base.sigma_mm(); 2]);
         self.loads.push(Load { weight: 1.0, contact, lean, sigma_mm });
         for effect in &stages.covering {
-            effect.spread(base, &mut self.loads);
+            effect.spread(now, &mut self.loads);
         }
         self.reached_mm.fill(0.0);
         // A press table holds for the tool and the spread as declared.

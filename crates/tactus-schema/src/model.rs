@@ -13,7 +13,7 @@
 //! knots = { at_mm = [0.2, 0.4, 0.6], growth = [0.0, 0.3, 0.4] }
 //! ```
 //!
-//! A parameter that may differ with where the tip stands ([`tactus_model::effect::Parameter::varies`]) has a value or a table:
+//! A parameter that may differ with where the tip stands, or with time ([`tactus_model::effect::Parameter::varies`]) has a value or a table:
 //!
 //! ```toml
 //! [[effect]]

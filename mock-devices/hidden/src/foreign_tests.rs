@@ -660,6 +660,12 @@ fn outside_physics_of_the_electronics_changes_what_it_says_and_nothing_else() {
     let (common, drawn) = of("common-mode", 1);
     let shift = drawn("side") * drawn("share") * sum(&clean) / 48.0;
     near(&common[0], &clean.iter().map(|rise| rise - shift).collect::<Vec<_>>(), 1e-9);
+    let (shadow, drawn) = of("arm-shadow", 40);
+    // 2 mm from the middle.
+    let reach = 2.0 / drawn("length_mm");
+    let counts = drawn("side") * drawn("counts") * reach.tanh();
+    near(&shadow[0], &clean.iter().map(|rise| rise + counts).collect::<Vec<_>>(), 1e-9);
+    near(&shadow[39], &[counts; 48], 1e-9);
     let (flicker, _) = of("gain-flicker", 2);
     for row in &flicker {
         near(row, &scaled(&clean, row[19] / clean[19]), 1e-9);

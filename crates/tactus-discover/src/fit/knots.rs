@@ -26,9 +26,12 @@ const OF_THRESHOLDS: usize = 8;
 /// the least, formulas follow as much.
 const PRESSES_A_KNOT: usize = 4;
 const OF_TIME_LINE: std::ops::RangeInclusive<usize> = 8..=24;
-/// Number of places of a table, and the least distance from the first to the last, in mm.
-const OF_TABLE: usize = 5;
+/// Number of places of a table over the sensor, and of one of depth or time; the least distance from the first to the last: in mm, or of time
+/// in s.
+const OVER_THE_SENSOR: usize = 5;
+const OF_DEPTH_OR_TIME: usize = 8;
 const APART_MM: f64 = 0.05;
+const APART_S: f64 = 1.0;
 /// The narrowest threshold and the slowest speed, as shares of the greatest.
 const LEAST_THRESHOLD: f64 = 0.03;
 const LEAST_SPEED: f64 = 0.01;
@@ -212,34 +215,52 @@ impl Problem<'_> {
     pub(crate) fn weights_at(&self, table: &Table) -> Vec<Vec<f64>> {
         let (bins, frames) = (self.predictor.bins, self.predictor.frames);
         let registration = &self.predictor.known.registration;
-        let place = |bin: usize| place(table.by, &frames.position_mm[bins.first[bin]], registration);
+        let place =
+            |bin: usize| place(table.by, bins.t_s[bin], &frames.position_mm[bins.first[bin]], registration);
         let places: Vec<f64> = (0..bins.len()).map(place).collect();
         let weights = |knot| places.iter().map(|place| hat(&table.at, knot, *place)).collect();
         (0..table.at.len()).map(weights).collect()
     }
 }
 
-/// Where the tip stands, as a table has it; the covering's surface is at a height of 0.
-fn place(by: By, [x_mm, y_mm, z_mm]: &[f64; 3], registration: &Registration) -> f64 {
+/// Where the tip stands, or when, as a table has it; the covering's surface is at a height of 0.
+fn place(by: By, t_s: f64, [x_mm, y_mm, z_mm]: &[f64; 3], registration: &Registration) -> f64 {
     let [x_mm, y_mm] = registration.to_sensor([*x_mm, *y_mm]);
     match by {
         By::Depth => -z_mm,
         By::X => x_mm,
         By::Y => y_mm,
+        By::Time => t_s,
     }
 }
 
-/// Places of a table that these frames can tell apart: evenly from end to end of where the tool pressed. `None` if it pressed at one place.
+/// Places of a table that these frames can tell apart, from end to end of where the tool pressed: evenly over the sensor, closer together near
+/// the surface, where a tool first touches, and with as many frames in contact between moments. `None` if it pressed at one place or moment.
 pub(crate) fn table_places(by: By, frames: &Frames, registration: &Registration) -> Option<Vec<f64>> {
-    let pressed = frames.position_mm.iter().filter(|[_, _, z_mm]| *z_mm < 0.0);
-    let pressed = pressed.map(|tip_mm| place(by, tip_mm, registration));
-    let (mut least, most) = pressed
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), place| (least.min(place), most.max(place)));
+    let tips = frames.position_mm.iter().zip(&frames.t_s).filter(|([_, _, z_mm], _)| *z_mm < 0.0);
+    let mut pressed: Vec<f64> = tips.map(|(tip_mm, t_s)| place(by, *t_s, tip_mm, registration)).collect();
+    pressed.sort_by(f64::total_cmp);
+    let [mut least, most] = [*pressed.first()?, *pressed.last()?];
     if by == By::Depth {
         least = 0.0;
     }
-    let places = (0..OF_TABLE).map(|k| least + (most - least) * k as f64 / (OF_TABLE - 1) as f64);
-    (most - least > APART_MM).then(|| places.collect())
+    let (count, apart) = match by {
+        By::Depth => (OF_DEPTH_OR_TIME, APART_MM),
+        By::X | By::Y => (OVER_THE_SENSOR, APART_MM),
+        By::Time => (OF_DEPTH_OR_TIME, APART_S),
+    };
+    let place = |k: usize| {
+        let share = k as f64 / (count - 1) as f64;
+        match by {
+            By::Depth => most * share.powi(2),
+            By::X | By::Y => least + (most - least) * share,
+            By::Time => pressed[k * (pressed.len() - 1) / (count - 1)],
+        }
+    };
+    let mut places: Vec<f64> = (0..count).map(place).collect();
+    // Moments of a short press among runs of hours may be the same one.
+    places.dedup_by(|one, before| *one - *before < apart / count as f64);
+    (most - least > apart).then_some(places)
 }
 
 /// True if a curve is a line in the run's time.

@@ -141,3 +141,23 @@ fn the_places_of_a_table_share_one_direction_by_their_weights() {
         }
     }
 }
+
+#[test]
+fn the_places_of_a_table_are_those_that_the_presses_tell_apart() {
+    let known = known();
+    let noise = vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS];
+    let frames = measured(&known, &[], &noise);
+    let places = |by| table_places(by, &frames, &known.registration).unwrap();
+    // Presses are up to 0.5 mm deep. The first frames in contact are near 0.5 s, the last near 143 s.
+    let depths_mm: Vec<f64> = (0..8).map(|k| 0.5 * (f64::from(k) / 7.0).powi(2)).collect();
+    assert_near(&places(By::Depth), &depths_mm);
+    let times = places(By::Time);
+    assert_eq!(times.len(), 8);
+    for (k, time_s) in (0..).zip(&times) {
+        assert!((time_s - (0.5 + 142.5 * f64::from(k) / 7.0)).abs() < 3.0, "{times:?}");
+    }
+    let [x_mm, y_mm] = [places(By::X), places(By::Y)];
+    for (mm, apart) in x_mm.windows(2).chain(y_mm.windows(2)).map(|two| (two, two[1] - two[0])) {
+        assert!(apart > 1.0, "{mm:?}");
+    }
+}

@@ -203,6 +203,10 @@ fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> 
         // Several shapes with different times have any spread together.
         return vec![neutral];
     }
+    if name == "by_depth" {
+        // What a memory follows: the element's own signal or the tool's depth. A fit finds what is between.
+        return range.to_vec();
+    }
     let is_time = name.ends_with("_s") && !name.ends_with("_per_s");
     if is_time {
         // The data do not show anything faster than a frame or slower than their duration.

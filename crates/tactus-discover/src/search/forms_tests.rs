@@ -1,8 +1,8 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::Effect;
 use tactus_model::effect::{By, Definition, Knots, Table};
+use tactus_model::{Effect, Indenter};
 
 use crate::fixtures::{ELEMENTS, found, known, measured};
 use crate::{Discovery, Known, Verdict};
@@ -16,11 +16,13 @@ fn discovered(effect: Effect) -> Discovery {
 
 /// What it finds with a model that may have effects already.
 fn discovered_by(model: &Known, effect: Effect) -> Discovery {
+    found(model, &measured(&known(), &[effect], &white()))
+}
+
+fn white() -> Vec<Vec<f64>> {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-    let noise: Vec<Vec<f64>> =
-        (0..30 * ELEMENTS).map(|_| (0..ELEMENTS).map(|_| NOISE_COUNTS * normal()).collect()).collect();
-    found(model, &measured(&known(), &[effect], &noise))
+    (0..30 * ELEMENTS).map(|_| (0..ELEMENTS).map(|_| NOISE_COUNTS * normal()).collect()).collect()
 }
 
 fn free(name: &str, parameters: &[(&str, f64)], at: Vec<f64>, value: impl Fn(f64) -> f64) -> Effect {
@@ -112,4 +114,23 @@ fn a_parameter_that_differs_with_the_place_is_found_as_a_table() {
     let effect = found.effects.iter().find(|effect| effect.name() == "misregistration").unwrap();
     let (_, of_model) = effect.tables().next().unwrap();
     assert_eq!(of_model.values, table.knots.iter().map(|knot| knot.value).collect::<Vec<_>>());
+}
+
+/// A wide tool that is worn down in the run: of the whole image, no gain that falls is like it.
+#[test]
+fn a_parameter_that_differs_with_time_is_found_as_a_table() {
+    let wide = Indenter::Cylinder { diameter_mm: 5.0 };
+    let known = Known { indenters: [("cyl1".to_owned(), wide)].into(), ..known() };
+    let (at, values) = (vec![0.0, 40.0, 140.0], vec![1.0, 0.85, 0.7]);
+    let new = Effect::neutral(Definition::find("indenter-size").unwrap());
+    let worn = Table { by: By::Time, at, values };
+    let effects = [new.with_table("ratio", worn.clone()).unwrap()];
+    let found = found(&known, &measured(&known, &effects, &white()));
+    let [step] = &found.steps[..] else { panic!("{:?}", found.steps) };
+    assert_eq!(step.effect, "indenter-size");
+    let [table] = &step.curves[..] else { panic!("{step:?}") };
+    assert_eq!((table.of, table.at), ("ratio", "time_s"));
+    for knot in &table.knots {
+        assert!((knot.value - worn.value(knot.at)).abs() < 0.03, "{table:?}");
+    }
 }

@@ -21,13 +21,13 @@
 //! medium, J. Crank, *The Mathematics of Diffusion* (1975). Five points for a Gaussian: Gauss-Hermite quadrature, M. Abramowitz and I. A.
 //! Stegun, *Handbook of Mathematical Functions* (1964), 25.4.46.
 
-use super::{BaseModel, By, Definition, Load, Make, OnCovering, Parameter};
+use super::{By, Definition, Load, Make, Now, OnCovering, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "anisotropic-spread",
     summary: "the point spread differs along x and y",
     parameters: &[
-        Parameter::real("ratio", 1.0, [0.2, 5.0]).or_table_of(&By::ALL),
+        Parameter::real("ratio", 1.0, [0.2, 5.0]).or_table_of(&[By::Depth, By::X, By::Y]),
         Parameter::real("slant", 0.0, [-0.8, 0.8]).apart(),
     ],
     near_twins: &["crosstalk", "indenter-size", "misregistration", "sigma_intercept_mm"],
@@ -57,7 +57,7 @@ impl OnCovering for AnisotropicSpread {
         true
     }
 
-    fn spread(&self, _: BaseModel<'_>, loads: &mut Vec<Load>) {
+    fn spread(&self, _: Now<'_>, loads: &mut Vec<Load>) {
         for Load { sigma_mm: [x, y], .. } in loads.iter_mut() {
             *x *= self.ratio.sqrt();
             *y /= self.ratio.sqrt();

@@ -16,7 +16,7 @@
 //! The paper's Sec. 3 and Fig. 5a measure sigma at three depths under each covering and fit all with one line in
 //! thickness (Eq. 4); this is the first term that the line leaves out.
 
-use super::{BaseModel, By, Definition, Load, Make, OnCovering, Parameter};
+use super::{By, Definition, Load, Make, Now, OnCovering, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "depth-dependent-spread",
@@ -38,9 +38,9 @@ impl OnCovering for DepthDependentSpread {
         true
     }
 
-    fn spread(&self, base: BaseModel<'_>, loads: &mut Vec<Load>) {
+    fn spread(&self, now: Now<'_>, loads: &mut Vec<Load>) {
         for Load { contact, sigma_mm, .. } in loads {
-            let depth_share = (contact.depth_mm / base.covering.thickness_mm).clamp(0.0, 1.0);
+            let depth_share = (contact.depth_mm / now.base.covering.thickness_mm).clamp(0.0, 1.0);
             *sigma_mm = sigma_mm.map(|sigma_mm| sigma_mm * (1.0 + self.growth_share * depth_share));
         }
     }

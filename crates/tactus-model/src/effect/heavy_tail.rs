@@ -16,7 +16,7 @@
 //! The layered elastic solution falls off more slowly than the Gaussian of its core (the paper's Fig. 3); a mixture
 //! of two Gaussians is the usual closed form of such a spread.
 
-use super::{BaseModel, Definition, Load, Make, OnCovering, Parameter};
+use super::{Definition, Load, Make, Now, OnCovering, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "heavy-tail",
@@ -42,7 +42,7 @@ impl OnCovering for HeavyTail {
         true
     }
 
-    fn spread(&self, _: BaseModel<'_>, loads: &mut Vec<Load>) {
+    fn spread(&self, _: Now<'_>, loads: &mut Vec<Load>) {
         if self.tail_share == 0.0 {
             return;
         }

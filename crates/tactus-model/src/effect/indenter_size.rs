@@ -6,7 +6,7 @@
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `ratio` | - | 1 | 0.2 to 5 | true width over declared width; may be a table of `depth_mm`, as for a rounded rim |
+//! | `ratio` | - | 1 | 0.2 to 5 | true width over declared width; may be a table of `depth_mm`, as for a rounded rim, or of `time_s`, as for a tool that wears |
 //!
 //! The width is the diameter of a cylinder, sphere or cone (a cone keeps its angle), both sides of a box, and x and y of a
 //! mesh. Sensitivity is stated for the reference tool as declared, and does not change.
@@ -16,13 +16,13 @@
 
 use std::sync::Arc;
 
-use super::{BaseModel, By, Definition, Make, OnContact, Parameter};
+use super::{By, Definition, Make, Now, OnContact, Parameter};
 use crate::{Contact, Indenter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "indenter-size",
     summary: "the tool is wider or narrower than declared",
-    parameters: &[Parameter::real("ratio", 1.0, [0.2, 5.0]).or_table_of(&[By::Depth])],
+    parameters: &[Parameter::real("ratio", 1.0, [0.2, 5.0]).or_table_of(&[By::Depth, By::Time])],
     near_twins: &["indenter-tilt", "anisotropic-spread", "sigma_intercept_mm", "sensitivity_counts_per_mm"],
     shown_by: &["grid-sweep", "element-centres"],
     curve: None,
@@ -35,7 +35,7 @@ struct IndenterSize {
 }
 
 impl OnContact for IndenterSize {
-    fn touch(&self, _: BaseModel<'_>, contact: &mut Contact) {
+    fn touch(&self, _: Now<'_>, contact: &mut Contact) {
         match &mut contact.indenter {
             Indenter::Cylinder { diameter_mm }
             | Indenter::Sphere { diameter_mm }

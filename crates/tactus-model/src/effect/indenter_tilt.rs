@@ -21,7 +21,7 @@
 //! # Source
 //! A rigid flat punch that is turned about an axis in the plane: K. L. Johnson, *Contact Mechanics* (1985).
 
-use super::{BaseModel, By, Definition, Make, OnContact, Parameter};
+use super::{By, Definition, Make, Now, OnContact, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -47,11 +47,11 @@ struct IndenterTilt {
 }
 
 impl OnContact for IndenterTilt {
-    fn touch(&self, _: BaseModel<'_>, contact: &mut Contact) {
-        contact.depth_mm -= self.touched_share * contact.indenter.lowered_mm(self.lean(contact));
+    fn touch(&self, now: Now<'_>, contact: &mut Contact) {
+        contact.depth_mm -= self.touched_share * contact.indenter.lowered_mm(self.lean(now, contact));
     }
 
-    fn lean(&self, _: &Contact) -> [f64; 2] {
+    fn lean(&self, _: Now<'_>, _: &Contact) -> [f64; 2] {
         self.tilt_deg.map(|tilt_deg| tilt_deg.to_radians().tan())
     }
 }

@@ -9,14 +9,16 @@
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `stiffening_share` | - | 0 | -0.5 to 2 | relative growth of the signal for each factor e in `1 + v / speed` |
+//! | `stiffening_share` | - | 0 | 0 to 2 | relative growth of the signal for each factor e in `1 + v / speed` |
 //! | `speed_mm_per_s` | mm/s | 1 | 0.001 to 100 | speed from which on stiffening shows |
 //! | `recovery_s` | s | 1 | 0.001 to 100000 | time in which the speed that still acts falls to 1/e |
 //!
 //! | knots | unit | range | meaning |
 //! |---|---|---|---|
 //! | `at_mm_per_s` | mm/s | above 0 | speeds |
-//! | `growth` | - | -0.9 to 20 | `growth` there, in straight lines over the logarithm of the speed; from 0 at 0 to the first a straight line, constant after the last; replaces `stiffening_share` and `speed_mm_per_s` |
+//! | `growth` | - | 0 to 20 | `growth` there, never falling, in straight lines over the logarithm of the speed; from 0 at 0 to the first a straight line, constant after the last; replaces `stiffening_share` and `speed_mm_per_s` |
+//!
+//! A faster press is never softer: a signal that grows while the tool waits is creep, a `relaxation` with a negative share.
 //!
 //! The speed of loading is the rate at which depth grows while the tool is in the covering. Without loading the stiffening dies
 //! away with the recovery time: with a short one it acts on the way down only, with a long one as long as the tool is in the
@@ -35,7 +37,7 @@ pub(super) static DEFINITION: Definition = Definition {
     name: "rate-stiffening",
     summary: "the response depends on the speed of loading",
     parameters: &[
-        Parameter::real("stiffening_share", 0.0, [-0.5, 2.0]),
+        Parameter::real("stiffening_share", 0.0, [0.0, 2.0]),
         Parameter::real("speed_mm_per_s", 1.0, [1e-3, 100.0]),
         Parameter::real("recovery_s", 1.0, [1e-3, 1e5]),
     ],
@@ -45,8 +47,8 @@ pub(super) static DEFINITION: Definition = Definition {
         at: "at_mm_per_s",
         of: "growth",
         kind: CurveKind::LogLine,
-        range: [-0.9, 20.0],
-        rises: Rises::No,
+        range: [0.0, 20.0],
+        rises: Rises::Value,
         replaces: &["stiffening_share", "speed_mm_per_s"],
         formula: |values, at| at.iter().map(|speed| values[0] * (speed / values[1]).ln_1p()).collect(),
     }),

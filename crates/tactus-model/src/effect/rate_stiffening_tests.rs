@@ -1,5 +1,6 @@
 use crate::Effect;
 use crate::effect::bench::{effect, free, signals_mm};
+use crate::effect::{Definition, Knots};
 
 fn stiff(recovery_s: f64) -> Effect {
     effect(
@@ -47,13 +48,27 @@ fn a_press_in_more_steps_reads_the_same() {
     );
 }
 
+/// A signal that grows while the tool waits is creep.
+#[test]
+fn a_faster_press_is_never_softer() {
+    let softer = Effect::new(
+        "rate-stiffening",
+        [("stiffening_share", -0.1), ("speed_mm_per_s", 0.5), ("recovery_s", 1.0)],
+    );
+    assert!(softer.unwrap_err().to_string().contains("from 0 to 2"));
+    let knots = Knots { at: vec![0.1, 1.0], values: vec![0.4, 0.2] };
+    let definition = Definition::find("rate-stiffening").unwrap();
+    let falling = Effect::of_knots(definition, [("recovery_s", 1.0)], knots).unwrap_err().to_string();
+    assert!(falling.contains("so that it does not fall"), "{falling}");
+}
+
 #[test]
 fn knots_give_a_growth_over_the_logarithm_of_the_speed() {
-    // Stiffest at 1 mm/s, which no logarithm is.
-    let hump = free("rate-stiffening", [("recovery_s", 1.0)], &[0.1, 1.0, 10.0], &[0.1, 0.4, 0.2]);
-    for (mm_per_s, growth) in [(0.05, 0.05), (0.1, 0.1), (10.0_f64.powf(-0.5), 0.25), (1.0, 0.4), (1e3, 0.2)]
+    // Steepest below 1 mm/s, which no logarithm is.
+    let step = free("rate-stiffening", [("recovery_s", 1.0)], &[0.1, 1.0, 10.0], &[0.1, 0.4, 0.45]);
+    for (mm_per_s, growth) in [(0.05, 0.05), (0.1, 0.1), (10.0_f64.powf(-0.5), 0.25), (1.0, 0.4), (1e3, 0.45)]
     {
-        let [_, got] = signals_mm(&hump, [(0.0, -0.1), (0.6 / mm_per_s, 0.5)]);
+        let [_, got] = signals_mm(&step, [(0.0, -0.1), (0.6 / mm_per_s, 0.5)]);
         assert_near([got], [0.5 * (1.0 + growth)]);
     }
 }

@@ -1,8 +1,9 @@
 //! `relaxation`: the response falls while a depth is held, and comes back after release.
 //!
 //! ```text
-//! u -> u - sum of w_k q_k          q_k' = (u - q_k) / tau_k,  q_k = 0 before the first moment
+//! u -> u - f sum of w_k q_k        q_k' = (u - q_k) / tau_k,  q_k = 0 before the first moment
 //!
+//! f = 1 - by_depth + by_depth depth / thickness
 //! w = relaxed_share / 3,  tau = time_constant {1 / spread_ratio, 1, spread_ratio}, or both from knots
 //! ```
 //!
@@ -13,6 +14,7 @@
 //! | `spread_ratio` | - | 4 | 1 to 100 | ratio of one time constant to the next; at 1 all three are equal |
 //! | `after_release` | - | 0.5 | 0 to 1 | share of the change that still shows without contact |
 //! | `recovery_ratio` | - | 1.5 | 1 to 1000 | speed of the recovery without contact, over that of the relaxation |
+//! | `by_depth` | - | 0 | 0 to 1 | how much of the change grows with the depth: 0 in a linear solid; 1: the deeper, the larger the share that flows; may be left out |
 //!
 //! | knots | unit | range | meaning |
 //! |---|---|---|---|
@@ -39,7 +41,8 @@
 //!
 //! # Source
 //! The generalised Maxwell solid (a Prony series, here of three terms), in stress under prescribed strain: J. D. Ferry,
-//! *Viscoelastic Properties of Polymers* (1980), chapter 1.
+//! *Viscoelastic Properties of Polymers* (1980), chapter 1. A factor of the load on the hereditary part: R. A. Schapery, *Polymer Engineering &
+//! Science* 9, 295 (1969).
 
 use super::lag::{Lags, spread};
 use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises};
@@ -54,6 +57,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("spread_ratio", 4.0, [1.0, 100.0]),
         Parameter::real("after_release", 0.5, [0.0, 1.0]),
         Parameter::real("recovery_ratio", 1.5, [1.0, 1000.0]),
+        Parameter::real("by_depth", 0.0, [0.0, 1.0]).or_neutral(),
     ],
     near_twins: &[
         "low-pass",
@@ -82,7 +86,12 @@ pub(super) static DEFINITION: Definition = Definition {
             Some(Knots { at, values }) => Lags::new(at.iter().copied().zip(values.iter().copied())),
             None => Lags::new(spread(values[1], values[2]).map(|tau_s| (tau_s, values[0] / 3.0))),
         };
-        Box::new(Relaxation { relaxed, after_release: values[3], recovery_ratio: values[4] })
+        Box::new(Relaxation {
+            relaxed,
+            after_release: values[3],
+            recovery_ratio: values[4],
+            by_depth: values[5],
+        })
     }),
 };
 
@@ -92,6 +101,7 @@ struct Relaxation {
     relaxed: Lags,
     after_release: f64,
     recovery_ratio: f64,
+    by_depth: f64,
 }
 
 impl OnCovering for Relaxation {
@@ -103,7 +113,10 @@ impl OnCovering for Relaxation {
         } else {
             self.relaxed.begin(&vec![0.0; signal_mm.len()], signal_mm);
         }
+        let depth_share = (contact.depth_mm / now.base.covering.thickness_mm).clamp(0.0, 1.0);
+        let shows = 1.0 - self.by_depth + self.by_depth * depth_share;
         for (u, lost) in signal_mm.iter_mut().zip(self.relaxed.output()) {
+            let lost = shows * lost;
             // A covering does not pull.
             *u = if is_pressed { (*u - lost).max(u.min(0.0)) } else { *u - self.after_release * lost };
         }

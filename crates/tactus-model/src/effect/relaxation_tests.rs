@@ -56,6 +56,20 @@ fn a_linear_solid_shows_what_it_has_forgotten_after_release() {
 }
 
 #[test]
+fn a_deeper_press_loses_a_larger_share_if_it_goes_by_depth() {
+    let mut one = creeping();
+    one.effects = vec![relaxing(4.0, 1.0).with("by_depth", 1.0).unwrap()];
+    for depth_mm in [0.2, 0.5, 0.8] {
+        let down = upon(&one, 21, depth_mm);
+        let mut pipeline = Pipeline::new(&one).unwrap();
+        let at_once = pipeline.step(Moment::at(0.0), &down)[21];
+        let share = 0.3 * depth_mm / 1.016 * (1.0 - (-0.5_f64).exp());
+        let later = pipeline.step(Moment::at(2.0), &down)[21];
+        assert!((later - at_once * (1.0 - share)).abs() < 1e-9, "{depth_mm} mm: {later}");
+    }
+}
+
+#[test]
 fn a_press_reads_the_same_at_any_rate() {
     // The reference tool's signal is in proportion to depth, and so straight between the points.
     let one = creeping();

@@ -83,13 +83,18 @@ pub trait OnMotion: Debug + Send + Sync {
 /// An effect on the tool and how it stands; without memory.
 pub trait OnContact: Debug + Send + Sync {
     /// Changes the contact.
-    fn touch(&self, _base: BaseModel<'_>, _contact: &mut Contact) {}
+    fn touch(&self, _now: Now<'_>, _contact: &mut Contact) {}
 
     /// Lean of the tool about the foot of its axis: the increase of a flat face's depth per mm along the tool's own x and
     /// y, for the contact before [`OnContact::touch`]. A [`Contact`] is always upright, so the lean is separate. The leans of several effects
     /// add.
-    fn lean(&self, _contact: &Contact) -> [f64; 2] {
+    fn lean(&self, _now: Now<'_>, _contact: &Contact) -> [f64; 2] {
         [0.0; 2]
+    }
+
+    /// True if what it does depends on the time.
+    fn is_timed(&self) -> bool {
+        false
     }
 }
 
@@ -97,7 +102,7 @@ pub trait OnContact: Debug + Send + Sync {
 pub trait OnCovering: Debug + Send + Sync {
     /// Changes how the loads spread, before the elements integrate them; without memory. The list starts with one load
     /// of weight 1 with the base model's spread, the same along x and y.
-    fn spread(&self, _base: BaseModel<'_>, _loads: &mut Vec<Load>) {}
+    fn spread(&self, _now: Now<'_>, _loads: &mut Vec<Load>) {}
 
     /// True if it changes how the loads spread.
     fn spreads(&self) -> bool {

@@ -6,19 +6,19 @@
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `offset_mm` | mm | 0 | -2 to 2 | the surface stands so much higher than the touch that found it says |
+//! | `offset_mm` | mm | 0 | -2 to 2 | the surface stands so much higher than the touch that found it says; may be a table of `time_s`, as for a covering that settles |
 //!
 //! A negative offset is the same as a threshold of contact.
 //!
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
 
-use super::{Definition, Make, Now, OnMotion, Parameter, TipState};
+use super::{By, Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "surface-offset",
     summary: "the covering's surface stands higher or lower than the touch that found it says",
-    parameters: &[Parameter::real("offset_mm", 0.0, [-2.0, 2.0])],
+    parameters: &[Parameter::real("offset_mm", 0.0, [-2.0, 2.0]).or_table_of(&[By::Time])],
     near_twins: &["saturation", "hardening", "backlash", "indenter-tilt"],
     shown_by: &["corners", "element-centres", "ladder"],
     curve: None,

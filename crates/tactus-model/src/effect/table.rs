@@ -1,14 +1,13 @@
-//! Tables: parameters that differ with where the tip stands.
+//! Tables: parameters that differ with where the tip stands, or with time.
 //!
-//! A tool with a rounded rim is narrower where it only touches; a guide that is bent shifts the tip by another amount at each place. An effect
-//! whose parameter [`varies`](super::Parameter::varies) has, in place of one value, a table of the tip's depth or place: straight lines
-//! between the listed places, and constant beyond the first and the last.
+//! A tool with a rounded rim is narrower where it only touches; a guide that is bent shifts the tip by another amount at each place; a tool
+//! that is worn down gets narrower. An effect whose parameter [`varies`](super::Parameter::varies) has, in place of one value, a table of the
+//! tip's depth or place, or of the run's time: straight lines between the listed places, and constant beyond the first and the last.
 //!
 //! Only effects without memory have such parameters: at each moment they act as if the parameter had the table's value there.
 
 use super::{
-    BaseModel, EffectError, KNOTS_MAX, Load, Now, OnContact, OnCovering, OnMotion, Parameter, TipState,
-    Values,
+    EffectError, KNOTS_MAX, Load, Now, OnContact, OnCovering, OnMotion, Parameter, TipState, Values,
 };
 use crate::Contact;
 
@@ -21,6 +20,8 @@ pub enum By {
     X,
     /// The tip's y, sensor frame, in mm.
     Y,
+    /// The time since the start of the run, in s.
+    Time,
 }
 
 /// A parameter's values at places; in the parameter's unit.
@@ -28,7 +29,7 @@ pub enum By {
 pub struct Table {
     /// What it is a function of.
     pub by: By,
-    /// In mm, each greater than the one before.
+    /// In mm or, of time, in s; each greater than the one before.
     pub at: Vec<f64>,
     /// One for each place.
     pub values: Vec<f64>,
@@ -36,7 +37,7 @@ pub struct Table {
 
 impl By {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Depth, Self::X, Self::Y];
+    pub const ALL: [Self; 4] = [Self::Depth, Self::X, Self::Y, Self::Time];
 
     /// The name in model files.
     pub const fn name(self) -> &'static str {
@@ -44,22 +45,24 @@ impl By {
             Self::Depth => "depth_mm",
             Self::X => "x_mm",
             Self::Y => "y_mm",
+            Self::Time => "time_s",
         }
     }
 
-    fn of_contact(self, contact: &Contact) -> f64 {
-        self.of(contact.position_mm, contact.depth_mm)
+    fn of_contact(self, now: Now<'_>, contact: &Contact) -> f64 {
+        self.of(now, contact.position_mm, contact.depth_mm)
     }
 
-    fn of_tip(self, tip: &TipState) -> f64 {
-        self.of(tip.position_mm(), tip.surface_mm - tip.tip_mm[2])
+    fn of_tip(self, now: Now<'_>, tip: &TipState) -> f64 {
+        self.of(now, tip.position_mm(), tip.surface_mm - tip.tip_mm[2])
     }
 
-    const fn of(self, [x_mm, y_mm]: [f64; 2], depth_mm: f64) -> f64 {
+    const fn of(self, now: Now<'_>, [x_mm, y_mm]: [f64; 2], depth_mm: f64) -> f64 {
         match self {
             Self::Depth => depth_mm,
             Self::X => x_mm,
             Self::Y => y_mm,
+            Self::Time => now.t_s,
         }
     }
 }
@@ -133,28 +136,40 @@ impl<Object: ?Sized> Tabled<fn(&Values) -> Box<Object>> {
         }
         (self.make)(&Values { parameters, knots: self.values.knots.clone(), tables: Vec::new() })
     }
+
+    fn has_table_of_time(&self) -> bool {
+        self.values.tables.iter().any(|(_, table)| table.by == By::Time)
+    }
 }
 
 impl OnMotion for Tabled<fn(&Values) -> Box<dyn OnMotion>> {
     fn place(&mut self, now: Now<'_>, tip: &mut TipState) {
-        self.at(|by| by.of_tip(tip)).place(now, tip);
+        self.at(|by| by.of_tip(now, tip)).place(now, tip);
+    }
+
+    fn is_timed(&self) -> bool {
+        self.has_table_of_time()
     }
 }
 
 impl OnContact for Tabled<fn(&Values) -> Box<dyn OnContact>> {
-    fn touch(&self, base: BaseModel<'_>, contact: &mut Contact) {
-        self.at(|by| by.of_contact(contact)).touch(base, contact);
+    fn touch(&self, now: Now<'_>, contact: &mut Contact) {
+        self.at(|by| by.of_contact(now, contact)).touch(now, contact);
     }
 
-    fn lean(&self, contact: &Contact) -> [f64; 2] {
-        self.at(|by| by.of_contact(contact)).lean(contact)
+    fn lean(&self, now: Now<'_>, contact: &Contact) -> [f64; 2] {
+        self.at(|by| by.of_contact(now, contact)).lean(now, contact)
+    }
+
+    fn is_timed(&self) -> bool {
+        self.has_table_of_time()
     }
 }
 
 impl OnCovering for Tabled<fn(&Values) -> Box<dyn OnCovering>> {
-    fn spread(&self, base: BaseModel<'_>, loads: &mut Vec<Load>) {
+    fn spread(&self, now: Now<'_>, loads: &mut Vec<Load>) {
         let Some(contact) = loads.first().map(|load| load.contact.clone()) else { return };
-        self.at(|by| by.of_contact(&contact)).spread(base, loads);
+        self.at(|by| by.of_contact(now, &contact)).spread(now, loads);
     }
 
     fn spreads(&self) -> bool {
@@ -162,7 +177,11 @@ impl OnCovering for Tabled<fn(&Values) -> Box<dyn OnCovering>> {
     }
 
     fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
-        self.at(|by| by.of_contact(contact)).signal(now, contact, signal_mm);
+        self.at(|by| by.of_contact(now, contact)).signal(now, contact, signal_mm);
+    }
+
+    fn is_timed(&self) -> bool {
+        self.has_table_of_time()
     }
 }
 

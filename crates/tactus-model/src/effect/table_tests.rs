@@ -1,7 +1,7 @@
 use super::*;
-use crate::Effect;
 use crate::effect::bench::{effect, linear, still, upon};
 use crate::effect::{Make, REGISTRY};
+use crate::{Effect, Moment, Pipeline};
 
 fn table(by: By, at: &[f64], values: &[f64]) -> Table {
     Table { by, at: at.to_vec(), values: values.to_vec() }
@@ -46,7 +46,7 @@ fn a_table_of_one_value_is_that_value() {
     assert!(seen > 10, "{seen} parameters may be tables");
 }
 
-/// The readings at each place are those of the value that the table has there.
+/// The readings at each place and time are those of the value that the table has there; in one pipeline, which keeps what does not change.
 #[test]
 fn a_table_gives_each_place_its_own_value() {
     for (neutral, parameter, by) in varying() {
@@ -54,19 +54,22 @@ fn a_table_gives_each_place_its_own_value() {
             [0.05, 0.15].map(|share| parameter.neutral + share * (parameter.range[1] - parameter.neutral));
         let [from, to] = if by == By::Depth { [0.1, 0.5] } else { [2.0, 10.0] };
         let one = linear([neutral.with_table(parameter.name, table(by, &[from, to], &[low, high])).unwrap()]);
+        let mut with_table = Pipeline::new(&one).unwrap();
         for share in [0.0, 0.25, 1.0] {
             let place = from + share * (to - from);
-            let [mut at_mm, mut depth_mm] = [[8.1, 5.9, 0.0], [0.0, 0.0, 0.3]].map(|[x, y, z]| [x, y, z]);
+            let (mut at_mm, mut depth_mm, mut t_s) = ([8.1, 5.9], 0.3, 5.0);
             match by {
-                By::Depth => depth_mm[2] = place,
+                By::Depth => depth_mm = place,
                 By::X => at_mm[0] = place,
                 By::Y => at_mm[1] = place,
+                By::Time => t_s = place,
             }
-            let [x, y] = one.registration.to_robot([at_mm[0], at_mm[1]]);
-            let tip_mm = [x, y, one.surface_mm - depth_mm[2]];
+            let [x, y] = one.registration.to_robot(at_mm);
+            let tip_mm = [x, y, one.surface_mm - depth_mm];
             let value = low + share * (high - low);
             let constant = linear([neutral.with(parameter.name, value).unwrap()]);
-            for (got, want) in still(&one, tip_mm).into_iter().zip(still(&constant, tip_mm)) {
+            let got = with_table.step(Moment::at(t_s), &tip_mm);
+            for (got, want) in got.iter().zip(still(&constant, tip_mm)) {
                 assert!(
                     (got - want).abs() < 1e-6 * want.abs().max(1.0),
                     "{} {} by {}: {got} {want}",
@@ -103,7 +106,7 @@ fn what_breaks_the_rules_of_a_table_is_refused() {
     );
     assert!(refused("lean", one()).starts_with("indenter-tilt: no parameter \"lean\""));
     let size = effect("indenter-size", [("ratio", 1.0)]).with_table("ratio", one()).unwrap_err().to_string();
-    assert_eq!(size, "indenter-size: ratio is no table of x_mm; it may be one of depth_mm");
+    assert_eq!(size, "indenter-size: ratio is no table of x_mm; it may be one of depth_mm, time_s");
     let tabled = tilt.with_table("tilt_x_deg", one()).unwrap();
     assert_eq!(tabled.parameters().collect::<Vec<_>>(), [("tilt_y_deg", 0.0), ("touched_share", 0.5)]);
     assert_eq!(tabled.tables().collect::<Vec<_>>(), [("tilt_x_deg", &one())]);
@@ -121,6 +124,16 @@ fn only_stages_before_the_elements_have_tables() {
         let before =
             matches!(effect.definition().make, Make::Motion(_) | Make::Contact(_) | Make::Covering(_));
         assert!(before && parameter.kind == crate::effect::ParameterKind::Real, "{}", effect.name());
+    }
+}
+
+/// What follows time is nothing that a frame alone determines.
+#[test]
+fn a_table_of_time_acts_in_time_and_no_other() {
+    for (neutral, parameter, by) in varying() {
+        let values = [parameter.neutral; 2];
+        let one = neutral.with_table(parameter.name, table(by, &[0.0, 1.0], &values)).unwrap();
+        assert_eq!(one.acts_in_time(), by == By::Time, "{} by {}", neutral.name(), by.name());
     }
 }
 

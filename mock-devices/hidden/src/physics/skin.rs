@@ -4,21 +4,6 @@ use std::f64::consts::TAU;
 
 use super::{Definition, PipelineHook, dot, left, minus, shift};
 
-pub(super) const THERMAL_GROWTH: Definition = Definition {
-    id: "thermal-growth",
-    effect: None,
-    is_library_point: false,
-    about: "depth' = depth + a (T - T_0): the column that holds the tool grows as the room warms",
-    is_fine: false,
-    make: |knobs| {
-        let mm_per_k = knobs.sign("side") * knobs.scaled("mm_per_k", 0.05);
-        let mut first_c = None;
-        PipelineHook::touch(move |now, touch| {
-            touch.depth_mm += mm_per_k * (now.temperature_c - *first_c.get_or_insert(now.temperature_c));
-        })
-    },
-};
-
 pub(super) const AIR_POCKET: Definition = Definition {
     id: "air-pocket",
     effect: None,

@@ -31,6 +31,21 @@ pub(super) const SETTLING_SURFACE: Definition = Definition {
     },
 };
 
+pub(super) const THERMAL_GROWTH: Definition = Definition {
+    id: "thermal-growth",
+    effect: Some("surface-offset"),
+    is_library_point: false,
+    about: "depth' = depth + a (T - T_0): the column that holds the tool grows as the room warms",
+    is_fine: false,
+    make: |knobs| {
+        let mm_per_k = knobs.sign("side") * knobs.scaled("mm_per_k", 0.05);
+        let mut first_c = None;
+        PipelineHook::touch(move |now, touch| {
+            touch.depth_mm += mm_per_k * (now.temperature_c - *first_c.get_or_insert(now.temperature_c));
+        })
+    },
+};
+
 pub(super) const BOWED_SURFACE: Definition = Definition {
     id: "bowed-surface",
     effect: Some("surface-tilt"),

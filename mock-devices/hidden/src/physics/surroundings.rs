@@ -8,6 +8,23 @@ use super::drift::normal;
 use super::wiring::telegraph;
 use super::{Definition, PipelineHook, left, scale, shift};
 
+pub(super) const ARM_SHADOW: Definition = Definition {
+    id: "arm-shadow",
+    effect: None,
+    is_library_point: false,
+    about: "c' = c + a tanh((x - x_c)/L) of every element: the robot's arm is one more electrode, nearer the farther the tool reaches",
+    is_fine: false,
+    make: |knobs| {
+        let middle_mm = knobs.middle_mm();
+        let length_mm = knobs.between("length_mm", 3.0, 8.0);
+        let counts = knobs.sign("side") * knobs.scaled("counts", 15.0);
+        PipelineHook::readout(move |now, readings| {
+            let reach = (now.touch.point_mm[0] - middle_mm[0]) / length_mm;
+            shift(readings, counts * reach.tanh());
+        })
+    },
+};
+
 pub(super) const COMMON_MODE: Definition = Definition {
     id: "common-mode",
     effect: None,
