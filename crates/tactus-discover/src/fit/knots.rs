@@ -258,8 +258,12 @@ pub(crate) fn table_places(by: By, frames: &Frames, registration: &Registration)
         }
     };
     let mut places: Vec<f64> = (0..count).map(place).collect();
-    // Moments of a short press among runs of hours may be the same one.
-    places.dedup_by(|one, before| *one - *before < apart / count as f64);
+    // Moments of a short press among runs of hours may be the same one, and no frame may be between two depths.
+    places.dedup();
+    let has_weight = |places: &[f64], at| pressed.iter().any(|one| hat(places, at, *one) > 0.0);
+    while let Some(without) = (0..places.len()).find(|at| !has_weight(&places, *at)) {
+        places.remove(without);
+    }
     (most - least > apart).then_some(places)
 }
 

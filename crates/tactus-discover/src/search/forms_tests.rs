@@ -1,8 +1,8 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use tactus_model::Effect;
 use tactus_model::effect::{By, Definition, Knots, Table};
-use tactus_model::{Effect, Indenter};
 
 use crate::fixtures::{ELEMENTS, found, known, measured};
 use crate::{Discovery, Known, Verdict};
@@ -116,21 +116,17 @@ fn a_parameter_that_differs_with_the_place_is_found_as_a_table() {
     assert_eq!(of_model.values, table.knots.iter().map(|knot| knot.value).collect::<Vec<_>>());
 }
 
-/// A wide tool that is worn down in the run: of the whole image, no gain that falls is like it.
+/// A covering that settles: no constant offset, and no gain that falls, is like it at all depths.
 #[test]
 fn a_parameter_that_differs_with_time_is_found_as_a_table() {
-    let wide = Indenter::Cylinder { diameter_mm: 5.0 };
-    let known = Known { indenters: [("cyl1".to_owned(), wide)].into(), ..known() };
-    let (at, values) = (vec![0.0, 40.0, 140.0], vec![1.0, 0.85, 0.7]);
-    let new = Effect::neutral(Definition::find("indenter-size").unwrap());
-    let worn = Table { by: By::Time, at, values };
-    let effects = [new.with_table("ratio", worn.clone()).unwrap()];
-    let found = found(&known, &measured(&known, &effects, &white()));
+    let settling = Table { by: By::Time, at: vec![0.0, 40.0, 140.0], values: vec![0.0, -0.05, -0.08] };
+    let still = Effect::neutral(Definition::find("surface-offset").unwrap());
+    let found = discovered(still.with_table("offset_mm", settling.clone()).unwrap());
     let [step] = &found.steps[..] else { panic!("{:?}", found.steps) };
-    assert_eq!(step.effect, "indenter-size");
+    assert_eq!(step.effect, "surface-offset");
     let [table] = &step.curves[..] else { panic!("{step:?}") };
-    assert_eq!((table.of, table.at), ("ratio", "time_s"));
+    assert_eq!((table.of, table.at), ("offset_mm", "time_s"));
     for knot in &table.knots {
-        assert!((knot.value - worn.value(knot.at)).abs() < 0.03, "{table:?}");
+        assert!((knot.value - settling.value(knot.at)).abs() < 0.005, "{table:?}");
     }
 }
