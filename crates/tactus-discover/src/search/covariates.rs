@@ -283,6 +283,7 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     for (axis, (on_sensor, in_element, centres)) in axes.into_iter().enumerate() {
         let values: Vec<f64> = place.iter().map(|place| place[axis]).collect();
         add(on_sensor, "mm", &values, &deep, 4, &[Signal, along[axis], along[1 - axis]]);
+        add(on_sensor, "mm", &values, &every, 4, &offset);
         let within: Vec<f64> = values.iter().map(|value| value - nearest(centres, *value)).collect();
         let of_deep = || within.iter().zip(&deep).filter(|(_, deep)| **deep).map(|(within, _)| *within);
         let spread_mm = of_deep().fold(f64::NEG_INFINITY, f64::max) - of_deep().fold(f64::INFINITY, f64::min);

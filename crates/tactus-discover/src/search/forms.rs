@@ -89,7 +89,7 @@ impl Search<'_> {
     }
 
     /// The formula of a class as knots; `None` if it has no curve, or no formula to refute.
-    fn as_knots(&self, formula: &Fitted, name: &str) -> Option<Knots> {
+    pub(super) fn as_knots(&self, formula: &Fitted, name: &str) -> Option<Knots> {
         let curve = self.added(formula, name).find_map(Term::curve)?;
         let at = places(curve, self.problem);
         let knots = of_formulas(curve, self.added(formula, name), &at);
@@ -97,7 +97,7 @@ impl Search<'_> {
     }
 
     /// A model with knots, fitted, in place of all added terms of a class.
-    fn with_knots(&self, at: &Fitted, name: &str, knots: &Knots) -> Result<Fitted, DiscoverError> {
+    pub(super) fn with_knots(&self, at: &Fitted, name: &str, knots: &Knots) -> Result<Fitted, DiscoverError> {
         self.reporter.tell(&format!("fitting {name} with knots"));
         let terms =
             self.added(at, name).take(1).map(|term| Term { knots: Some(knots.clone()), ..term.clone() });

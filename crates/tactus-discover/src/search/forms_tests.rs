@@ -1,8 +1,8 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::Effect;
 use tactus_model::effect::{By, Definition, Knots, Table};
+use tactus_model::{Effect, Indenter};
 
 use crate::fixtures::{ELEMENTS, found, known, measured};
 use crate::{Discovery, Known, Verdict};
@@ -128,5 +128,25 @@ fn a_parameter_that_differs_with_time_is_found_as_a_table() {
     assert_eq!((table.of, table.at), ("offset_mm", "time_s"));
     for knot in &table.knots {
         assert!((knot.value - settling.value(knot.at)).abs() < 0.005, "{table:?}");
+    }
+}
+
+/// A wide tool that is worn down: a gain that falls leaves a sixth of it, whatever its form, and the tool's size next to nothing.
+#[test]
+fn a_free_part_that_leaves_hardly_anything_wins_over_a_formula() {
+    let wide = Indenter::Cylinder { diameter_mm: 5.0 };
+    let known = Known { indenters: [("cyl1".to_owned(), wide)].into(), ..known() };
+    let worn = Table { by: By::Time, at: vec![0.0, 40.0, 140.0], values: vec![1.0, 0.85, 0.7] };
+    let new = Effect::neutral(Definition::find("indenter-size").unwrap());
+    let effects = [new.with_table("ratio", worn.clone()).unwrap()];
+    let found = found(&known, &measured(&known, &effects, &white()));
+    let step = &found.steps[0];
+    assert_eq!(step.effect, "indenter-size", "{:?}", found.contests);
+    let [table] = &step.curves[..] else { panic!("{step:?}") };
+    assert_eq!((table.of, table.at), ("ratio", "time_s"));
+    // The elements' gains may take a factor of all times.
+    for knot in &table.knots {
+        let [found, wanted] = [knot.value / table.knots[0].value, worn.value(knot.at)];
+        assert!((found - wanted).abs() < 0.01, "{table:?}");
     }
 }

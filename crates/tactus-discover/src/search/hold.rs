@@ -18,6 +18,8 @@ use crate::progress::Stage;
 /// Another class takes the place of one if its odds are greater by this logarithm.
 const BETTER_LN_ODDS: f64 = 3.0;
 const EXCHANGES_MAX: usize = 4;
+/// A class that leaves less than this share of what another leaves, as a square, leaves hardly anything of it: half of its rms.
+const HARDLY_ANYTHING: f64 = 0.25;
 /// Greatest number of other classes that are fitted in a class's place.
 const OTHERS_MAX: usize = 4;
 /// A class must gain so many standard errors, from the scatter of blocks.
@@ -31,6 +33,8 @@ impl Search<'_> {
     pub(super) fn hold(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
         let barred = grown.barred.len();
         let mut exchanges_left = EXCHANGES_MAX;
+        // Classes whose form is right where that of another is not, with that other one.
+        let mut right: Vec<[&'static str; 2]> = Vec::new();
         'again: loop {
             if self.is_back(grown, barred) {
                 return Ok(());
@@ -78,15 +82,28 @@ impl Search<'_> {
                     continue;
                 }
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
-                let likeliest = others.iter().max_by(|a, b| self.rank(a).total_cmp(&self.rank(b)));
+                let may_return = |other: &&Beside| !right.contains(&[*name, other.name]);
+                let likeliest = others.iter().filter(may_return);
+                let likeliest = likeliest.max_by(|a, b| self.rank(a).total_cmp(&self.rank(b)));
                 let present = self.rank_of(name, ln_odds, &grown.at);
                 let may_exchange = exchanges_left > 0 && !self.is_spent();
-                let better =
-                    likeliest.filter(|best| self.rank(best) > present + BETTER_LN_ODDS && may_exchange);
-                if let Some(better) = better {
+                let better = likeliest.filter(|best| self.rank(best) > present + BETTER_LN_ODDS);
+                let better = match better {
+                    _ if exchanges_left == 0 || self.is_spent() => None,
+                    Some(better) => {
+                        let from = better.fitted.parameters.clone();
+                        Some((better.name, self.problem.fit_from(from, POLISH_ROUNDS)?))
+                    }
+                    None => {
+                        let better = self.of_a_right_form(&grown.at, &less, (name, ln_odds), &others)?;
+                        right.extend(better.iter().map(|(better, _)| [*better, *name]));
+                        better
+                    }
+                };
+                if let Some((better, fitted)) = better {
                     exchanges_left -= 1;
-                    grown.exchanged.push(GivenUp { effect: name, because: Because::Other(better.name) });
-                    grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
+                    grown.exchanged.push(GivenUp { effect: name, because: Because::Other(better) });
+                    grown.at = fitted;
                     continue 'again;
                 }
                 let classes = others.iter().map(|other| (other.name, other.ln_odds)).collect();
@@ -165,6 +182,29 @@ impl Search<'_> {
     /// What is small beside the gain of the draft may be the draft's form.
     pub(crate) fn is_needless(&self, draft_ln_odds: f64, [alone, both]: [&Fitted; 2]) -> bool {
         self.ln_odds(alone, both) < LN_ODDS_LEAST.max(FORM_SHARE * draft_ln_odds)
+    }
+
+    /// The class with the greatest odds in the place of one that has its formula, if it leaves hardly anything of what that one leaves with
+    /// its free part, too: a formula is excused for its form, which a free part does not have.
+    fn of_a_right_form(
+        &self,
+        at: &Fitted,
+        less: &Fitted,
+        (name, ln_odds): (&'static str, f64),
+        others: &[Beside],
+    ) -> Result<Option<(&'static str, Fitted)>, DiscoverError> {
+        let likeliest = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
+        let likeliest = likeliest.filter(|other| other.ln_odds > ln_odds + BETTER_LN_ODDS);
+        let has_formula = !self.added(at, name).any(Term::is_free);
+        let knots = || self.as_knots(at, name).filter(|_| has_formula);
+        let Some((other, knots)) = likeliest.and_then(|other| Some((other, knots()?))) else {
+            return Ok(None);
+        };
+        let fitted = self.problem.fit_from(other.fitted.parameters.clone(), POLISH_ROUNDS)?;
+        let free = self.with_knots(at, name, &knots)?;
+        let is_ahead = self.ln_odds(less, &fitted) > self.ln_odds(less, &free) + BETTER_LN_ODDS;
+        let leaves_little = self.left_over(&fitted) <= HARDLY_ANYTHING * self.left_over(&free);
+        Ok((is_ahead && leaves_little).then_some((other.name, fitted)))
     }
 
     /// The other classes, fitted in a place, if their first steps promise these odds.

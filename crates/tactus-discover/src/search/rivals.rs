@@ -9,6 +9,7 @@
 //! | sum of signals | the sum of all signals | the element's own signal |
 //! | share of the largest signal | the element's own signal over the largest | the element's own signal |
 //! | place | the tip's x and, apart, y | the element's own signal |
+//! | place, in counts | the tip's x and, apart, y, wherever it stands | 1 |
 //! | place in the element | the tip's x and y from the nearest centre | the element's own signal |
 //! | direction of approach | the side from which the tool came, x and y | the signal, its slopes along x and y |
 //! | distance from the tip | the distance of the element's centre from the tip | the largest signal |
@@ -98,8 +99,8 @@ pub(crate) fn rivals<'a>(
     let smooth = |hats: Vec<Vec<f64>>, form: Form| -> Vec<Direction<'a>> {
         hats.into_iter().map(|hat| seen.column(Factor::Bins(Arc::new(hat)), form)).collect()
     };
-    let both = |of: &dyn Fn(usize) -> Vec<f64>| -> Vec<Vec<f64>> {
-        [0, 1].into_iter().flat_map(|axis| hats(&of(axis), deep)).collect()
+    let both = |of: &dyn Fn(usize) -> Vec<f64>, among: &[bool]| -> Vec<Vec<f64>> {
+        [0, 1].into_iter().flat_map(|axis| hats(&of(axis), among)).collect()
     };
     let aside = [0, 1].into_iter().flat_map(|axis| {
         let side = &history.aside[axis];
@@ -110,7 +111,7 @@ pub(crate) fn rivals<'a>(
     });
     let height_mm: Vec<f64> = history.depth_mm.iter().map(|depth_mm| -depth_mm).collect();
     let low: Vec<bool> = height_mm.iter().zip(&free).map(|(mm, free)| *free && *mm <= LOW_MM).collect();
-    let (of_sum, of_places) = (hats(&sums, deep), both(&of_place));
+    let (of_sum, of_places) = (hats(&sums, deep), both(&of_place, deep));
     let (of_sum_apart, of_places_apart) = (unloading(&of_sum), unloading(&of_places));
     let apart = |name, of: &'static str, hats| Rival {
         beside: Some(of),
@@ -126,7 +127,8 @@ pub(crate) fn rivals<'a>(
         Rival::alone("share of the largest signal", Seen::smooth(&seen, Seen::share, Seen::signal)),
         Rival::alone("place", smooth(of_places, Form::Signal)),
         apart("place, apart", "place", of_places_apart),
-        Rival::alone("place in the element", smooth(both(&in_element), Form::Signal)),
+        Rival::alone("place, in counts", smooth(both(&of_place, &vec![true; deep.len()]), Form::Offset)),
+        Rival::alone("place in the element", smooth(both(&in_element, deep), Form::Signal)),
         Rival::alone("direction of approach", aside.collect()),
         Rival::alone("distance from the tip", of_distance),
         Rival {

@@ -136,6 +136,8 @@ const ELSEWHERE: &[Group] = &[
         When::Always,
         &[
             Covariate::Time,
+            Covariate::PlaceX,
+            Covariate::PlaceY,
             Covariate::TravelSpeed,
             Covariate::SumOfSignals,
             Covariate::Counts,
