@@ -227,6 +227,19 @@ fn what_cannot_be_simulated_is_refused_with_what_to_do() {
     }
 }
 
+/// No part of a tool is deeper in the covering than that is thick.
+#[test]
+fn a_tool_below_the_covering_is_said_to_be() {
+    let folder = tempfile::tempdir().unwrap();
+    for (depth_mm, is_below) in [("1.0", false), ("1.1", true)] {
+        let args = ["simulate", "--scene", "sphere", "--covering-mm", "1.016", "--depth-mm", depth_mm];
+        let said = tactus(folder.path(), &args);
+        assert_eq!(said.code, Some(0), "{said:?}");
+        let note = "deeper than the covering: what is below it presses as if 1.016 mm deep";
+        assert_eq!(said.out.contains(note), is_below, "{depth_mm}: {}", said.out);
+    }
+}
+
 #[test]
 fn the_papers_figures_are_drawn() {
     let folder = TempDir::new().unwrap();

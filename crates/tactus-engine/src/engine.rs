@@ -200,7 +200,7 @@ pub enum ResumeError {
     NotPaused,
     /// The run waits for another covering, and its thickness was not confirmed.
     #[error(
-        "the run waits for the {wanted_mm} mm covering: once it is in place, `tactus resume --covering {wanted_mm}`"
+        "the run waits for the {wanted_mm} mm covering: once it is in place, `tactus resume --covering-mm {wanted_mm}`"
     )]
     CoveringNotConfirmed {
         /// Thickness of the covering that the script asked for.

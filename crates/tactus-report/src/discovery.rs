@@ -168,13 +168,21 @@ fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
             format!("{} <small>{upper}</small>", digits(part.rms_noise, 3))
         },
     );
+    let gap_closed = found.final_.closed.map_or_else(
+        || "\u{2013}".into(),
+        |of_gap| {
+            let told = closed(of_gap);
+            let in_two = |(share, error)| format!("{share} <small>&#177; {error}</small>");
+            told.split_once(" +- ").map_or_else(|| told.clone(), in_two)
+        },
+    );
     let split = &found.split;
     for (name, figure) in [
         ("noise / counts", noise.map_or_else(|| "unknown".into(), |rms| digits(rms, 3))),
         ("residual before / counts", level(found.base.heldout_rms_counts)),
         ("residual after / counts", level(found.final_.level.heldout_rms_counts)),
         ("structured / noise, 95 % bound", structured),
-        ("gap closed", found.final_.closed.map_or_else(|| "\u{2013}".into(), closed)),
+        ("gap closed", gap_closed),
         (
             "presses fitted",
             format!(

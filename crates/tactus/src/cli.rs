@@ -285,8 +285,8 @@ pub(crate) struct ResumeArgs {
     #[command(flatten)]
     pub(crate) lease: LeaseArgs,
     /// Confirms that the covering of this thickness is in place, for a run that waits for it.
-    #[arg(long, value_name = "MM")]
-    pub(crate) covering: Option<f64>,
+    #[arg(long, alias = "covering", value_name = "MM")]
+    pub(crate) covering_mm: Option<f64>,
 }
 
 /// Arguments of `plan`.

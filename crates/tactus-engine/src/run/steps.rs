@@ -302,8 +302,8 @@ impl Run {
             change(thickness_mm);
         } else {
             let ask = format!(
-                "put the {thickness_mm} mm covering in place, set its surface to z = 0, then `tactus resume --covering \
-                 {thickness_mm}`"
+                "put the {thickness_mm} mm covering in place, set its surface to z = 0, then `tactus resume \
+                 --covering-mm {thickness_mm}`"
             );
             self.shared.control.send_modify(|control| {
                 control.paused = Some("the script".into());

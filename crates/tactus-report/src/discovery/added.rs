@@ -134,7 +134,7 @@ fn curve(f: &mut fmt::Formatter<'_>, effect: &str, curve: &FittedCurve) -> fmt::
     } else if curve.is_table() {
         writeln!(
             f,
-            "<p>No one value of <code>{}</code> describes the presses: it differs with the tip's <code>{}</code>.</p>",
+            "<p>No one value of <code>{}</code> describes the presses: it differs with <code>{}</code>.</p>",
             Text(of),
             Text(at)
         )?;

@@ -243,7 +243,7 @@ struct KnotsJson<'a> {
     heldout_rms_formula: Option<f64>,
 }
 
-/// A parameter that differs with where the tip stands, as the model file has it.
+/// A parameter that differs with where the tip stands or with time, as the model file has it.
 #[derive(Serialize)]
 struct TableJson<'a> {
     parameter: &'a str,

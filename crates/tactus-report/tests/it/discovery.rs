@@ -396,7 +396,7 @@ fn the_pages_numbers_are_those_that_were_found() {
     let html = html(&explained());
     for text in [
         "<dd>9.36 <small>4.68 &#215; noise</small></dd>",
-        "<dt>gap closed</dt><dd>99.6 % +- 0.4 %</dd>",
+        "<dt>gap closed</dt><dd>99.6 % <small>&#177; 0.4 %</small></dd>",
         "<dd>96 <small>24 held out</small></dd>",
         "<td>time since contact</td><td class=\"n\">0.400</td><td class=\"n\">30.0</td><td>s</td><td class=\"n\">3.81</td><td class=\"n\">&lt; 0.001</td>",
         "<td>hysteresis</td><td class=\"n\">39.4</td><td class=\"n\">&lt; 0.001</td><td class=\"n\">4.31</td><td class=\"n\">2.15</td><td class=\"n\">82 %</td><td>taken</td>",

@@ -118,7 +118,7 @@ pub(crate) fn pause(common: &Common, args: &LeaseArgs) -> anyhow::Result<Exit> {
 }
 
 pub(crate) fn resume(common: &Common, args: &ResumeArgs) -> anyhow::Result<Exit> {
-    command(common, Command::Resume, &args.lease, args.covering)
+    command(common, Command::Resume, &args.lease, args.covering_mm)
 }
 
 pub(crate) fn reset(common: &Common, args: &LeaseArgs) -> anyhow::Result<Exit> {

@@ -90,15 +90,20 @@ fn to_json(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by:
 fn print(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by: &str) -> anyhow::Result<()> {
     let array = scene.array();
     let Contact { position_mm: [x_mm, y_mm], rotation_deg, depth_mm, .. } = scene.contact;
+    let thickness_mm = scene.simulator.covering.thickness_mm;
     let mut fields = vec![
         ("scene", format!("{} (simulated, {computed_by})", args.scene)),
         ("array", format!("{}, {} rows of {}", array.name(), array.rows(), array.cols())),
         ("tool", format!("at {x_mm:.2}, {y_mm:.2} mm, {rotation_deg} degrees, {depth_mm} mm deep")),
         (
             "covering",
-            format!("{} mm, sigma {:.3} mm", scene.simulator.covering.thickness_mm, scene.sigma_mm()),
+            format!("{thickness_mm} mm, sigma {:.3} mm", scene.sigma_mm()),
         ),
     ];
+    if depth_mm > thickness_mm {
+        let note = format!("deeper than the covering: what is below it presses as if {thickness_mm} mm deep");
+        fields.push(("note", note));
+    }
     let full_scale_counts = array.full_scale_counts();
     let beyond = copies.iter().flatten().filter(|counts| **counts > full_scale_counts).count();
     if beyond > 0 {
