@@ -86,7 +86,6 @@ impl Search<'_> {
                 let likeliest = others.iter().filter(may_return);
                 let likeliest = likeliest.max_by(|a, b| self.rank(a).total_cmp(&self.rank(b)));
                 let present = self.rank_of(name, ln_odds, &grown.at);
-                let may_exchange = exchanges_left > 0 && !self.is_spent();
                 let better = likeliest.filter(|best| self.rank(best) > present + BETTER_LN_ODDS);
                 let better = match better {
                     _ if exchanges_left == 0 || self.is_spent() => None,

@@ -95,10 +95,7 @@ fn print(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by: &
         ("scene", format!("{} (simulated, {computed_by})", args.scene)),
         ("array", format!("{}, {} rows of {}", array.name(), array.rows(), array.cols())),
         ("tool", format!("at {x_mm:.2}, {y_mm:.2} mm, {rotation_deg} degrees, {depth_mm} mm deep")),
-        (
-            "covering",
-            format!("{thickness_mm} mm, sigma {:.3} mm", scene.sigma_mm()),
-        ),
+        ("covering", format!("{thickness_mm} mm, sigma {:.3} mm", scene.sigma_mm())),
     ];
     if depth_mm > thickness_mm {
         let note = format!("deeper than the covering: what is below it presses as if {thickness_mm} mm deep");
