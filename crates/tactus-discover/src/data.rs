@@ -38,3 +38,4 @@ pub(crate) use history::History;
 pub use known::Known;
 pub(crate) use motion::{interval_s, load_speeds_mm_per_s, still, turns};
 pub(crate) use noise::{Noise, QUIETEST};
+pub(crate) use spectrum::Line;

@@ -54,7 +54,7 @@ fn discover_on_threads(
     let base = &prepared.base;
     reporter.enter(Stage::Locating, "locating where data and base model disagree");
     let lacking = not_shown::lacking(&problem, prepared.replicates);
-    let mut candidates = Candidate::all(&problem, base, &prepared.frequencies_hz)?;
+    let mut candidates = Candidate::all(&problem, base, &prepared.lines)?;
     candidates.retain(|one| lacking.iter().all(|lacking| lacking.effect != one.definition.name));
     let search = Search {
         problem: &problem,

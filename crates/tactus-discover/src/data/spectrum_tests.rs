@@ -5,10 +5,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tactus_schema::table::{Phase, RowView};
 
-use super::{lines_hz, transform};
+use super::{Line, lines, transform};
 use crate::data::Frames;
 
-const ELEMENTS: usize = 4;
+const ELEMENTS: usize = 16;
+const COLUMNS: usize = 4;
 const RATE_HZ: f64 = 30.0;
 
 /// Presses for so many frames each, and as many between them.
@@ -36,11 +37,11 @@ fn pressed(frames_of_presses: impl Iterator<Item = usize>) -> Frames {
     frames
 }
 
-/// A residual of noise with a standard deviation of 1, plus `upon` at each time in s.
-fn residual(frames: &Frames, rng: &mut ChaCha8Rng, upon: impl Fn(f64) -> f64) -> Vec<f64> {
+/// A residual of noise with a standard deviation of 1, plus `upon` at each time in s and element.
+fn residual(frames: &Frames, rng: &mut ChaCha8Rng, upon: impl Fn(f64, usize) -> f64) -> Vec<f64> {
     let of = |reading: usize| -> f64 {
         let noise: f64 = StandardNormal.sample(rng);
-        noise + upon((reading / ELEMENTS) as f64 / RATE_HZ)
+        noise + upon((reading / ELEMENTS) as f64 / RATE_HZ, reading % ELEMENTS)
     };
     (0..frames.len() * ELEMENTS).map(of).collect()
 }
@@ -52,8 +53,9 @@ fn a_tone_is_found_at_any_frequency_where_presses_have_no_rhythm() {
     let lengths: Vec<usize> = (0..140).map(|_| rng.random_range(20..60)).collect();
     let frames = pressed(lengths.into_iter());
     let is_found = |hz: f64| {
-        let residual = residual(&frames, &mut rng, |t_s| 0.35 * (TAU * hz * t_s).sin());
-        lines_hz(&frames, &residual).first().is_some_and(|line| (line - hz).abs() < 0.005)
+        let residual = residual(&frames, &mut rng, |t_s, _| 0.35 * (TAU * hz * t_s).sin());
+        let lines = lines(&frames, COLUMNS, &residual);
+        lines.first().is_some_and(|line| (line.frequency_hz - hz).abs() < 0.005)
     };
     let found =
         (0..150).map(|step| 2.0 + 0.0731 * f64::from(step)).map(is_found).filter(|found| *found).count();
@@ -65,9 +67,43 @@ fn a_tone_is_found_at_any_frequency_where_presses_have_no_rhythm() {
 fn what_each_press_leaves_behind_is_no_tone() {
     let frames = pressed([23, 41].into_iter().cycle().take(160));
     let since_release_s = |t_s: f64| (t_s * RATE_HZ).rem_euclid(64.0) / RATE_HZ;
-    let left = |t_s: f64| 3.0 * (-since_release_s(t_s)).exp();
+    let left = |t_s: f64, _| 3.0 * (-since_release_s(t_s)).exp();
     let residual = residual(&frames, &mut ChaCha8Rng::seed_from_u64(12), left);
-    assert!(lines_hz(&frames, &residual).is_empty());
+    let lines = lines(&frames, COLUMNS, &residual);
+    assert!(lines.is_empty(), "{lines:?}");
+}
+
+/// A tenth of the noise of an element: the powers of elements do not tell it, their sum does.
+#[test]
+fn a_faint_tone_of_all_elements_is_found_with_its_phase() {
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    let lengths: Vec<usize> = (0..140).map(|_| rng.random_range(20..60)).collect();
+    let frames = pressed(lengths.into_iter());
+    for phase_per_column_deg in [0.0, 45.0, -90.0, 135.0] {
+        let phase = |element: usize| (element % COLUMNS) as f64 * f64::to_radians(phase_per_column_deg);
+        let tone = |t_s: f64, element| 0.1 * (TAU * 7.3 * t_s + phase(element)).sin();
+        let found = lines(&frames, COLUMNS, &residual(&frames, &mut rng, tone));
+        let [Line { frequency_hz, phase_per_column_deg: found_deg }] = found[..] else {
+            panic!("{phase_per_column_deg} degrees: {found:?}")
+        };
+        assert!((frequency_hz - 7.3).abs() < 0.01, "{frequency_hz}");
+        assert!((found_deg - phase_per_column_deg).abs() < 1e-9, "{found_deg} for {phase_per_column_deg}");
+    }
+}
+
+/// One recording in fifty, of noise alone or with a slow drift that all elements have together.
+#[test]
+fn noise_has_no_lines() {
+    let mut rng = ChaCha8Rng::seed_from_u64(14);
+    let lengths: Vec<usize> = (0..140).map(|_| rng.random_range(20..60)).collect();
+    let frames = pressed(lengths.into_iter());
+    for drift in [0.0, 0.3] {
+        let slow = |t_s: f64, _| drift * (0.03 * t_s).sin();
+        let with_lines =
+            (0..30).filter(|_| !lines(&frames, COLUMNS, &residual(&frames, &mut rng, slow)).is_empty());
+        let with_lines = with_lines.count();
+        assert!(with_lines <= 3, "{with_lines} of 30 with a drift of {drift}");
+    }
 }
 
 #[test]

@@ -8,7 +8,8 @@ use super::parameters::{Parameters, Term};
 use super::predictor::{Predictor, no_images};
 use super::problem::{Fitted, Problem};
 use crate::data::{
-    Bins, Converter, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Noise, Rounding, spectrum, still,
+    Bins, Converter, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Line, Noise, Rounding, spectrum,
+    still,
 };
 
 /// Least number of fitted presses.
@@ -40,8 +41,8 @@ pub(crate) struct Prepared<'a> {
     pub(crate) bins: Bins,
     /// The base model, recalibrated on the bins.
     pub(crate) base: Fitted,
-    /// Frequencies of lines in the spectrum of the base model's residual; a grid of frequencies would miss them.
-    pub(crate) frequencies_hz: Vec<f64>,
+    /// Lines in the spectrum of the base model's residual; a grid of frequencies would miss them.
+    pub(crate) lines: Vec<Line>,
     pub(crate) warnings: Vec<String>,
     /// One cache for all predictions of these data.
     images: Arc<Images>,
@@ -104,9 +105,8 @@ impl<'a> Prepared<'a> {
             recalibrated(&Problem::new(Predictor::with_images(known, frames, bins, &images), &noise), &faulty)
         };
         let mut base = base_of(&bins)?;
-        let frequencies_hz =
-            lines_hz(&Predictor::with_images(known, frames, &whole, &images), &base, &faulty)?;
-        if !frequencies_hz.is_empty() {
+        let lines = lines(&Predictor::with_images(known, frames, &whole, &images), &base, &faulty)?;
+        if !lines.is_empty() {
             // Averaging over several frames would remove a tone.
             bins = Bins::of(frames, false)?;
             bins.weigh(frames, &noise, &heldout);
@@ -127,7 +127,7 @@ impl<'a> Prepared<'a> {
             whole,
             bins,
             base,
-            frequencies_hz,
+            lines,
             warnings,
             images,
         })
@@ -181,13 +181,13 @@ fn recalibrated(problem: &Problem<'_>, faulty: &Faulty) -> Result<Fitted, Discov
     problem.fit_from(start, BASE_ROUNDS)
 }
 
-/// Frequencies of lines in the spectrum of a model's residual of all frames.
-fn lines_hz(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<Vec<f64>, DiscoverError> {
+/// Lines in the spectrum of a model's residual of all frames.
+fn lines(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<Vec<Line>, DiscoverError> {
     let predicted = whole.predict(&base.parameters)?;
     let mut residual: Vec<f64> =
         whole.frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
     for element in (0..whole.frames.elements).filter(|element| faulty.is_weightless(*element)) {
         residual.iter_mut().skip(element).step_by(whole.frames.elements).for_each(|residual| *residual = 0.0);
     }
-    Ok(spectrum::lines_hz(whole.frames, &residual))
+    Ok(spectrum::lines(whole.frames, whole.known.array.cols(), &residual))
 }

@@ -5,12 +5,15 @@ use std::borrow::Cow;
 use tactus_model::effect::{By, CurveKind, Definition, Knots, ParameterKind, REGISTRY, Table};
 
 use super::wiring;
-use crate::data::{DiscoverError, interval_s};
+use crate::data::{DiscoverError, Line, interval_s};
 use crate::fit::{Fitted, Free, Problem, Scale, Term, places, table_places};
 
 /// Number of grid values of a shape parameter that spans orders of magnitude, and of any other or a ratio of times.
 const VALUES_MANY: usize = 5;
 const VALUES_FEW: usize = 3;
+
+/// What a line in the spectrum gives beside the frequency.
+const PHASE: &str = "phase_per_column_deg";
 
 /// If an element's reading seems to contain more than this share of another's signal, or a negative share, the element may
 /// answer for the other alone. Its fitted gain then means nothing.
@@ -41,27 +44,27 @@ enum Shapes {
 }
 
 impl Candidate {
-    /// All effects of the library, given a model without them and the frequencies of lines in its residual's spectrum.
+    /// All effects of the library, given a model without them and the lines in its residual's spectrum.
     pub(crate) fn all(
         problem: &Problem<'_>,
         at: &Fitted,
-        frequencies_hz: &[f64],
+        lines: &[Line],
     ) -> Result<Vec<Self>, DiscoverError> {
         let library = REGISTRY.iter().chain(&problem.predictor.known.drafts);
-        library.map(|definition| Self::of(definition, problem, at, frequencies_hz)).collect()
+        library.map(|definition| Self::of(definition, problem, at, lines)).collect()
     }
 
     fn of(
         definition: &'static Definition,
         problem: &Problem<'_>,
         at: &Fitted,
-        frequencies_hz: &[f64],
+        lines: &[Line],
     ) -> Result<Self, DiscoverError> {
         let (mut amplitudes, mut apart) = (Vec::new(), Vec::new());
         let mut alternatives = 1.0;
         let mut shapes = vec![Term::neutral(definition)];
         for (parameter, known) in definition.parameters.iter().enumerate() {
-            if known.kind != ParameterKind::Real {
+            if known.kind != ParameterKind::Real || known.name == PHASE {
                 continue;
             }
             let acts = known.neutral == 0.0 || {
@@ -71,7 +74,7 @@ impl Candidate {
             };
             let range = known.range;
             if known.name.ends_with("_hz") {
-                shapes = cross(&shapes, parameter, frequencies_hz);
+                shapes = of_lines(&shapes, parameter, lines);
                 alternatives = problem.duration_s / (2.0 * interval_s(problem.predictor.frames));
             } else if known.name == "duration_s" {
                 shapes = cross(&shapes, parameter, &[problem.duration_s.clamp(range[0], range[1])]);
@@ -185,6 +188,19 @@ fn free(definition: &'static Definition, amplitudes: &[usize], problem: &Problem
         free.extend(known.varies.iter().filter_map(table));
     }
     free
+}
+
+/// The shapes with the frequency of each line, and its phase where the effect has one.
+fn of_lines(shapes: &[Term], frequency: usize, lines: &[Line]) -> Vec<Term> {
+    let set = |shape: &Term, line: &Line| {
+        let mut set = shape.clone();
+        set.values[frequency] = line.frequency_hz;
+        if let Some(phase) = set.definition.parameters.iter().position(|known| known.name == PHASE) {
+            set.values[phase] = line.phase_per_column_deg;
+        }
+        set
+    };
+    shapes.iter().flat_map(|shape| lines.iter().map(move |line| set(shape, line))).collect()
 }
 
 fn cross(shapes: &[Term], parameter: usize, values: &[f64]) -> Vec<Term> {
