@@ -171,9 +171,9 @@ fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     let gap_closed = found.final_.closed.map_or_else(
         || "\u{2013}".into(),
         |of_gap| {
-            let told = closed(of_gap);
-            let in_two = |(share, error)| format!("{share} <small>&#177; {error}</small>");
-            told.split_once(" +- ").map_or_else(|| told.clone(), in_two)
+            let (share, error) = words::closed_and_error(of_gap);
+            let error = error.map_or_else(String::new, |error| format!(" <small>&#177; {error}</small>"));
+            format!("{share}{error}")
         },
     );
     let split = &found.split;

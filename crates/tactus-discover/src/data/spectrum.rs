@@ -10,6 +10,8 @@
 use std::f64::consts::{LN_2, TAU};
 use std::ops::Range;
 
+use tactus_model::effect::{By, Table};
+
 use super::frames::Frames;
 use super::motion::interval_s;
 use crate::numbers::{NORMAL_PER_MEDIAN, median};
@@ -160,22 +162,14 @@ impl Idle {
     /// presses would let it leak to other frequencies.
     fn take_off_drift(&self, values: &mut [f64]) {
         let count = values.len();
-        let part = |part: usize| part * count / DRIFT_PARTS..(part + 1) * count / DRIFT_PARTS;
-        let middles: Vec<[f64; 2]> = (0..DRIFT_PARTS)
-            .map(part)
+        let parts = (0..DRIFT_PARTS).map(|part| part * count / DRIFT_PARTS..(part + 1) * count / DRIFT_PARTS);
+        let (at, middles): (Vec<f64>, Vec<f64>) = parts
             .filter(|part| !part.is_empty())
-            .map(|part| [self.slots[usize::midpoint(part.start, part.end)] as f64, median(&values[part])])
-            .collect();
+            .map(|part| (self.slots[usize::midpoint(part.start, part.end)] as f64, median(&values[part])))
+            .unzip();
+        let drift = Table { by: By::Time, at, values: middles };
         for (value, slot) in values.iter_mut().zip(&self.slots) {
-            let after = middles.partition_point(|[at, _]| *at <= *slot as f64);
-            *value -= match (after.checked_sub(1).map(|before| middles[before]), middles.get(after).copied())
-            {
-                (Some([from, low]), Some([to, high])) => {
-                    low + (high - low) * (*slot as f64 - from) / (to - from)
-                }
-                (Some([_, only]), None) | (None, Some([_, only])) => only,
-                (None, None) => 0.0,
-            };
+            *value -= drift.value(*slot as f64);
         }
     }
 

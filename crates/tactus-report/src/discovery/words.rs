@@ -177,11 +177,18 @@ pub(super) fn percent(share: f64) -> String {
     format!("{} %", short(percent, usize::from((percent - 100.0).abs() < 2.0 || percent.abs() < 2.0)))
 }
 
-/// Such as `83 % +- 6 %` or `99.96 % +- 0.03 %`: the error has one digit at least, and the share as many decimals.
-pub fn closed(Closed { share, standard_error, .. }: Closed) -> String {
-    let Some(error) = standard_error else { return percent(share) };
+/// Such as `83 % +- 6 %` or `99.96 % +- 0.03 %`.
+pub fn closed(of_gap: Closed) -> String {
+    let (share, error) = closed_and_error(of_gap);
+    error.map_or_else(|| share.clone(), |error| format!("{share} +- {error}"))
+}
+
+/// The share and its error: the error has one digit at least, and the share as many decimals.
+pub(super) fn closed_and_error(Closed { share, standard_error, .. }: Closed) -> (String, Option<String>) {
+    let Some(error) = standard_error else { return (percent(share), None) };
     let places = if error < 0.000_95 { 2 } else { usize::from(error < 0.0095) };
-    format!("{} % +- {} %", short(100.0 * share, places), short((100.0 * error).max(0.01), places))
+    let in_percent = |share: f64| format!("{} %", short(share, places));
+    (in_percent(100.0 * share), Some(in_percent((100.0 * error).max(0.01))))
 }
 
 /// A residual in counts and in units of the noise.
