@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls hosts features vm discovery-slice gpu fleet (fuzz "600") (truth "20") bare advisories
+nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls hosts features vm discovery-slice gpu rigs-check fleet (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -254,11 +254,21 @@ bench-forward *arguments: bench-peers-tools
     {{ tools }}/peers/bin/python bench/peers/forward.py {{ arguments }}
 
 # The way of a frame to another process, frames to disk, presses of a script: beside zenoh, pyserial with pyzmq, LSL, mcap, h5py, bluesky.
-bench-service *arguments: bench-service-tools
-    cargo build --profile dist --package tactus --package tactus-daemon --package tactus-bench
-    cargo build --profile dist --package tactus-record --example throughput
+bench-service: bench-latency bench-recording bench-orchestration
+
+# The way of a frame to another process, beside zenoh, pyserial with pyzmq, LSL.
+bench-latency *arguments: bench-service-tools
+    cargo build --profile dist --package tactus-daemon --package tactus-bench
     {{ tools }}/service/bin/python bench/peers/latency.py {{ arguments }}
+
+# Frames to disk, beside mcap and h5py.
+bench-recording *arguments: bench-service-tools
+    cargo build --profile dist --package tactus-record --example throughput
     {{ tools }}/service/bin/python bench/peers/recording.py {{ arguments }}
+
+# Presses of a script, beside bluesky.
+bench-orchestration *arguments: bench-service-tools
+    cargo build --profile dist --package tactus
     {{ tools }}/service/bin/python bench/peers/orchestration.py {{ arguments }}
 
 # A virtual environment with what others use for it.
@@ -267,12 +277,17 @@ bench-service-tools:
     test -d {{ tools }}/service || python3 -m venv {{ tools }}/service
     {{ tools }}/service/bin/pip install --quiet --requirement bench/peers/service-requirements.txt
 
+# Twenty rigs with recordings, of which two lose their devices: the others lose nothing.
+rigs-check:
+    cargo build --profile dist --package tactus-daemon --package tactus-bench
+    target/dist/tactus-bench rigs 20 --record --dying 2 --check
+
 # How many rigs one service carries: memory and processor time of each, then more and more until a frame is lost; what the death of twenty is
 # to others; and how many sensors one Python process carries. docs/scale.md.
 bench-rigs *arguments="1,50,100 --record --search 3": bench-service-tools
     cargo build --profile dist --package tactus-daemon --package tactus-bench
     target/dist/tactus-bench rigs {{ arguments }}
-    target/dist/tactus-bench rigs 200 --record --dying 20
+    target/dist/tactus-bench rigs 200 --record --dying 20 --check
     {{ tools }}/service/bin/python bench/peers/capacity.py
 
 # A fleet of synthetic runs in growing sizes: rows/s, memory, bytes. docs/scale.md.

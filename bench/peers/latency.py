@@ -1,9 +1,11 @@
 """Latency of a frame: from its last byte at a pseudo-terminal to the callback in another process. Tactus and others, in turns.
 
 Every program reads the same frames from a pseudo-terminal (48 elements, the format of config/links/digitacts.toml) and passes them on
-to a process that notes when it has them, by CLOCK_MONOTONIC. A frame has its number in its first two readings.
+to a process that notes when it has them, by CLOCK_MONOTONIC. A frame has its number in its first two readings. A frame's last byte is at
+the terminal at some moment of the call that writes it: times are from the call's start, and the last two columns from its end.
 
-- tactus: `tactusd`, with recording off, its safety supervisor and history on; heard by a Rust client.
+- tactus: `tactusd`, with recording off, its safety supervisor and history on; heard by a Rust client in a callback (`Client::listen`).
+- queue: the same, heard from a subscription's queue (`Client::subscribe`), which wakes one more thread.
 - zenoh: a Rust program that reads the terminal and publishes as many bytes with zenoh; heard by zenoh in Rust.
 - zmq: pyserial and pyzmq, publisher and subscriber in Python.
 - lsl: pyserial and an LSL outlet; an inlet in Python, with `dest_obj`. LSL listens on all interfaces whatever one sets.
@@ -62,7 +64,7 @@ def arguments():
     parser.add_argument("--daemon", type=Path, default=REPOSITORY / "target/dist/tactusd")
     parser.add_argument("--rounds", type=int, default=5, help="the median of so many")
     parser.add_argument("--seconds", type=float, default=30.0, help="of a round at 30 Hz; a third of it at 1 kHz")
-    parser.add_argument("--who", nargs="+", default=["tactus", "zenoh", "zmq", "lsl"])
+    parser.add_argument("--who", nargs="+", default=["tactus", "queue", "zenoh", "zmq", "lsl"])
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--part", choices=PARTS, help=argparse.SUPPRESS)
     parser.add_argument("rest", nargs="*", help=argparse.SUPPRESS)
@@ -96,12 +98,14 @@ def one_round(who, args, rate_hz, count):
     lines = said.strip().splitlines()
     heard = dict(json.loads(lines[-1])) if lines and lines[-1].startswith("[") else {}
     numbers = range(max(first, min(heard, default=first)), max(heard, default=first + count - 1) + 1)
-    ms = sorted((heard[number] - writer.written[number]) / 1e6 for number in numbers if number in heard)
+    ms = sorted((heard[number] - writer.begun[number]) / 1e6 for number in numbers if number in heard)
     at = lambda share: ms[min(len(ms) - 1, int(share * len(ms)))] if ms else float("nan")
+    after_ms = [(heard[number] - writer.written[number]) / 1e6 for number in numbers if number in heard]
     return {
         "p50_ms": at(0.5),
         "p99_ms": at(0.99),
         "p999_ms": at(0.999),
+        "p50_after_write_ms": statistics.median(after_ms) if after_ms else float("nan"),
         "lost": len(numbers) - len(ms),
         "core_share": (after["cpu_s"] - before["cpu_s"]) / seconds,
         "memory_mib": after["memory_mib"],
@@ -109,12 +113,12 @@ def one_round(who, args, rate_hz, count):
 
 
 class Writer(threading.Thread):
-    """Writes frames in time, and notes when each was written."""
+    """Writes frames in time, and notes when the writing of each began and ended."""
 
     def __init__(self, master, rate_hz):
         super().__init__(daemon=True)
         self.master, self.rate_hz = master, rate_hz
-        self.number, self.written, self.ends = 0, {}, threading.Event()
+        self.number, self.begun, self.written, self.ends = 0, {}, {}, threading.Event()
 
     def run(self):
         start = time.monotonic_ns()
@@ -125,6 +129,7 @@ class Writer(threading.Thread):
                 time.sleep(ahead)
             # The number first: the frame may be heard before the next line.
             self.number += 1
+            self.begun[self.number - 1] = time.monotonic_ns()
             os.write(self.master, bytes_)
             self.written[self.number - 1] = time.monotonic_ns()
 
@@ -177,7 +182,7 @@ def start(command, seconds=0):
         time.sleep(0.1)
 
 
-def start_tactus(args, folder, device, writer, count):
+def start_tactus(args, folder, device, writer, count, *how):
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     rig = (REPOSITORY / "config/rigs/pty-declared.toml").read_text()
     rig = rig.replace('"mock/sensor"', json.dumps(device)).replace("rate_hz = 30.0", f"rate_hz = {writer.rate_hz}.0")
@@ -188,8 +193,12 @@ def start_tactus(args, folder, device, writer, count):
     passes = begin(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=(folder / "log").open("w"))
     # A rig is ready once its frames flow.
     writer.start()
-    hears = start([args.bench, "hear", endpoint, count], seconds=20)
+    hears = start([args.bench, "hear", endpoint, count, *how], seconds=20)
     return passes, hears
+
+
+def start_queue(args, folder, device, writer, count):
+    return start_tactus(args, folder, device, writer, count, "--queued")
 
 
 def start_zenoh(args, folder, device, writer, count):
@@ -286,20 +295,22 @@ PARTS = {
     "lsl-passes": lsl_passes,
     "lsl-hears": lsl_hears,
 }
-START = {"tactus": start_tactus, "zenoh": start_zenoh, "zmq": python_pair("zmq"), "lsl": python_pair("lsl")}
+START = {"tactus": start_tactus, "queue": start_queue, "zenoh": start_zenoh, "zmq": python_pair("zmq"), "lsl": python_pair("lsl")}
 
 
 def table(result):
     lines = [result["machine"]]
-    lines.append(f"{'rate':>7} {'load':<5} {'who':<7} {'p50 ms':>8} {'p99 ms':>8} {'p99.9 ms':>9} {'lost':>5} {'% core':>7} {'MiB':>6} {'p50 to zenoh':>13}")
+    names = ["p50 ms", "p99 ms", "p99.9 ms", "lost", "% core", "MiB", "to zenoh", "after write", "to zenoh"]
+    lines.append(f"{'rate':>7} {'load':<5} {'who':<7}" + "".join(f" {name:>11}" for name in names))
     for row in result["rows"]:
         same = [one for one in result["rows"] if (one["rate_hz"], one["busy"]) == (row["rate_hz"], row["busy"])]
-        zenoh = next((one["p50_ms"] for one in same if one["who"] == "zenoh"), float("nan"))
+        zenoh = next((one for one in same if one["who"] == "zenoh"), None)
+        ratio = lambda key: row[key] / zenoh[key] if zenoh else float("nan")
         load = "busy" if row["busy"] else "idle"
-        lines.append(
-            f"{row['rate_hz']:>4} Hz {load:<5} {row['who']:<7} {row['p50_ms']:>8.3f} {row['p99_ms']:>8.3f} {row['p999_ms']:>9.3f} "
-            f"{row['lost']:>5.0f} {100 * row['core_share']:>7.2f} {row['memory_mib']:>6.1f} {row['p50_ms'] / zenoh:>13.2f}"
-        )
+        values = [f"{row['p50_ms']:.3f}", f"{row['p99_ms']:.3f}", f"{row['p999_ms']:.3f}", f"{row['lost']:.0f}"]
+        values += [f"{100 * row['core_share']:.2f}", f"{row['memory_mib']:.1f}", f"{ratio('p50_ms'):.2f}"]
+        values += [f"{row['p50_after_write_ms']:.3f}", f"{ratio('p50_after_write_ms'):.2f}"]
+        lines.append(f"{row['rate_hz']:>4} Hz {load:<5} {row['who']:<7}" + "".join(f" {value:>11}" for value in values))
     return "\n".join(lines)
 
 

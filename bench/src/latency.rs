@@ -6,12 +6,13 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-use std::sync::mpsc;
 
 use anyhow::{Context, Result, anyhow};
 use rustix::time::{ClockId, clock_gettime};
 use tactus_bus::{Client, Endpoint, History};
 use tactus_schema::pb;
+use tokio::runtime::Runtime;
+use tokio::sync::mpsc;
 use zenoh::{Config, Session, Wait};
 
 /// Readings that the first of a frame counts up to.
@@ -27,12 +28,37 @@ const KEY: &str = "bare/frame";
 /// The number of a frame, and when it was heard: `CLOCK_MONOTONIC`, in ns.
 pub type Heard = (u64, i64);
 
-/// Hears so many frames of a service as its clients do.
+/// Hears so many frames of a service in a callback, in the thread that receives them.
+///
+/// # Errors
+/// If the service is not there.
+pub fn hear(endpoint: &Endpoint, frames: usize, ready: fn()) -> Result<Vec<Heard>> {
+    runtime()?.block_on(async {
+        let client = Client::connect(endpoint, None).await?;
+        let (send, mut arrived) = mpsc::unbounded_channel();
+        let take = move |frame: pb::Frame| {
+            let at_ns = now_ns();
+            // Nobody takes them any more once there are enough.
+            send.send((number_of(&frame), at_ns)).ok();
+        };
+        let listener = client.listen(take).await?;
+        ready();
+        let mut heard = Vec::with_capacity(frames);
+        while heard.len() < frames {
+            heard.push(arrived.recv().await.context("the service has gone")?);
+        }
+        drop(listener);
+        client.close().await?;
+        Ok(heard)
+    })
+}
+
+/// Hears so many frames of a service from a subscription's queue, in another thread than the one that receives them.
 ///
 /// # Errors
 /// If the service is not there, or goes.
-pub fn hear(endpoint: &Endpoint, frames: usize, ready: fn()) -> Result<Vec<Heard>> {
-    tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?.block_on(async {
+pub fn hear_queued(endpoint: &Endpoint, frames: usize, ready: fn()) -> Result<Vec<Heard>> {
+    runtime()?.block_on(async {
         let client = Client::connect(endpoint, None).await?;
         let mut subscription = client.subscribe::<pb::Frame>(History::None).await?;
         ready();
@@ -40,12 +66,15 @@ pub fn hear(endpoint: &Endpoint, frames: usize, ready: fn()) -> Result<Vec<Heard
         while heard.len() < frames {
             let frame = subscription.recv().await.context("the service has gone")?;
             let at_ns = now_ns();
-            let number = |index: usize| frame.counts.get(index).map_or(0, |counts| whole(*counts));
-            heard.push((number(0) + FIRST_READINGS * number(1), at_ns));
+            heard.push((number_of(&frame), at_ns));
         }
         client.close().await?;
         Ok(heard)
     })
+}
+
+fn runtime() -> std::io::Result<Runtime> {
+    tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()
 }
 
 /// Hears so many frames that [`relay`] passes on.
@@ -54,7 +83,7 @@ pub fn hear(endpoint: &Endpoint, frames: usize, ready: fn()) -> Result<Vec<Heard
 /// If nothing listens at the endpoint.
 pub fn hear_bare(endpoint: &Endpoint, frames: usize, ready: fn()) -> Result<Vec<Heard>> {
     let session = session("connect", endpoint)?;
-    let (send, heard) = mpsc::channel();
+    let (send, heard) = std::sync::mpsc::channel();
     let subscriber = session.declare_subscriber(KEY).callback(move |sample| {
         let at_ns = now_ns();
         // Nobody takes them any more once there are enough.
@@ -100,6 +129,12 @@ fn session(how: &str, endpoint: &Endpoint) -> Result<Session> {
         config.insert_json5(key, &value).map_err(|error| anyhow!(error))?;
     }
     zenoh::open(config).wait().map_err(|error| anyhow!(error))
+}
+
+/// The number of a frame that Tactus publishes.
+fn number_of(frame: &pb::Frame) -> u64 {
+    let number = |index: usize| frame.counts.get(index).map_or(0, |counts| whole(*counts));
+    number(0) + FIRST_READINGS * number(1)
 }
 
 fn number_in(frame: &[u8]) -> u64 {

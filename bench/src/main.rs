@@ -115,6 +115,9 @@ enum Part {
         /// Hear what `relay` publishes, with zenoh alone.
         #[arg(long)]
         bare: bool,
+        /// Hear from a subscription's queue instead of in a callback.
+        #[arg(long, conflicts_with = "bare")]
+        queued: bool,
     },
     /// Publishes the frames that come from a terminal with zenoh alone, until the terminal closes.
     Relay {
@@ -153,8 +156,12 @@ fn main() -> Result<()> {
         }
         Part::Growth => growth(&Growth::measure()?),
         Part::Limits => limits(&MachineLimits::measure()?),
-        Part::Hear { endpoint, frames, bare } => {
-            let hear = if bare { latency::hear_bare } else { latency::hear };
+        Part::Hear { endpoint, frames, bare, queued } => {
+            let hear = match (bare, queued) {
+                (true, _) => latency::hear_bare,
+                (false, true) => latency::hear_queued,
+                (false, false) => latency::hear,
+            };
             println!("{}", serde_json::to_string(&hear(&endpoint, frames, ready)?)?);
         }
         Part::Relay { device, endpoint } => latency::relay(&device, &endpoint, ready)?,

@@ -20,6 +20,7 @@ use tactus_bus::{Client, Endpoint, Hold};
 use tactus_record::{Entry, Message};
 use tactus_runner::config::RigFiles;
 use tactus_runner::embedded::{Truth, simulated_rig};
+use tactus_runner::open_files;
 use tactus_schema::key::Command;
 use tactus_schema::pb;
 use tactus_virtual::start_devices;
@@ -114,6 +115,7 @@ struct Service {
 /// # Errors
 /// If the system provides no sockets, or no thread.
 pub fn serve_devices(rigs: usize) -> Result<Devices> {
+    open_files::allow_all();
     let RigFiles { rig, codec, .. } = simulated_rig()?;
     let truth = |number| Truth::of_rig(&rig, number);
     let stage = |number| start_devices(truth(number), rig.covering, &codec, TokioInstant::now()).stage;

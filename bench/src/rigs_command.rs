@@ -22,6 +22,9 @@ pub(crate) struct RigsArgs {
     /// Let the devices of this many rigs die in the middle: what is counted is the others'.
     #[arg(long, value_name = "RIGS", default_value_t = 0)]
     dying: usize,
+    /// Fail if a frame is lost: for nights, in which nobody reads the table.
+    #[arg(long, conflicts_with = "search")]
+    check: bool,
     /// Length of each measurement in s.
     #[arg(long, default_value_t = 10.0)]
     seconds: f64,
@@ -55,25 +58,27 @@ impl RigsArgs {
         }
         let mut before = None;
         for &rigs in &self.rigs {
-            before = Some(self.measure(rigs, before)?);
+            let measured = self.measure(rigs, before)?;
+            ensure!(
+                !self.check || measured.is_whole(),
+                "{rigs} rigs: frames were lost, or came slower than the devices gave them"
+            );
+            before = Some(measured);
         }
         let (Some(times), Some(last)) = (self.search, before) else { return Ok(()) };
         let (mut whole, mut broken) = (last.rigs, None);
         while broken.is_none() {
             let rigs = whole * 2;
-            match self.measure(rigs, before) {
-                Ok(measured) if measured.is_whole() => whole = rigs,
-                Ok(_) => broken = Some(rigs),
-                Err(error) => {
-                    println!("{rigs} rigs: {error:#}");
-                    broken = Some(rigs);
-                }
+            if self.carries(rigs, before) {
+                whole = rigs;
+            } else {
+                broken = Some(rigs);
             }
         }
         let mut broken = broken.context("the search has ended")?;
         for _ in 0..times {
             let rigs = usize::midpoint(whole, broken);
-            if self.measure(rigs, before).is_ok_and(|measured| measured.is_whole()) {
+            if self.carries(rigs, before) {
                 whole = rigs;
             } else {
                 broken = rigs;
@@ -81,6 +86,17 @@ impl RigsArgs {
         }
         println!("{whole} rigs without a loss, {broken} with");
         Ok(())
+    }
+
+    /// True if so many rigs lose nothing; says what else went wrong.
+    fn carries(&self, rigs: usize, before: Option<RigsMeasured>) -> bool {
+        match self.measure(rigs, before) {
+            Ok(measured) => measured.is_whole(),
+            Err(error) => {
+                println!("{rigs} rigs: {error:#}");
+                false
+            }
+        }
     }
 
     fn measure(&self, rigs: usize, before: Option<RigsMeasured>) -> Result<RigsMeasured> {

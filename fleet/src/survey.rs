@@ -1,7 +1,7 @@
 //! Calibration and discovery of every run of a fleet, and what their results say together.
 //!
-//! The result of each run is a file of its own in the output folder. Workers of one folder share the runs ([`tactus_work`]). A run whose
-//! file in the fleet has changed is done again. Memory holds one run for each thread.
+//! The result of each run is a file of its own in the output folder. Workers of one folder share the runs ([`tactus_work`]). A run is done
+//! again if its file in the fleet has changed, or another version of the program did it. Memory holds one run for each thread.
 
 mod calibrated;
 mod discovered;
@@ -42,6 +42,8 @@ pub(crate) trait Analysis: Serialize + DeserializeOwned + Send + 'static {
 #[serde(bound(deserialize = "T: DeserializeOwned"))]
 pub(crate) struct RunResult<T> {
     schema: String,
+    /// Of the program that made it: two versions may see one sensor a little differently, which would look like a drift.
+    version: String,
     pub(crate) run: String,
     pub(crate) rig: String,
     pub(crate) date: String,
@@ -63,6 +65,7 @@ pub(crate) enum Outcome<T> {
 }
 
 const SCHEMA: &str = "tactus.fleet.result/1";
+const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 #[cfg(test)]
 impl<T> RunResult<T> {
@@ -70,6 +73,7 @@ impl<T> RunResult<T> {
     pub(crate) fn new(run: &str, rig: &str, outcome: Outcome<T>) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
+            version: VERSION.to_owned(),
             run: run.to_owned(),
             rig: rig.to_owned(),
             date: "2026-03-25".to_owned(),
@@ -133,6 +137,7 @@ impl<T: Analysis> Work for Survey<'_, T> {
         let Some(found) = stop.unless_set(move || T::of(&path)) else { return Ok(None) };
         Ok(Some(RunResult {
             schema: SCHEMA.to_owned(),
+            version: VERSION.to_owned(),
             run: head.run,
             rig: head.rig,
             date: head.date,
@@ -158,11 +163,12 @@ fn result_path<T: Analysis>(out: &Path, place: &Place, file: &ObjectMeta) -> Pat
     path
 }
 
-/// The result of a run; `None` if there is none, or one of another form.
+/// The result of a run; `None` if there is none, or one of another form or of another version of the program.
 fn read<T: Analysis>(path: &Path) -> anyhow::Result<Option<RunResult<T>>> {
     match fs::read(path) {
         Ok(text) => {
-            Ok(serde_json::from_slice(&text).ok().filter(|result: &RunResult<T>| result.schema == SCHEMA))
+            let is_ours = |result: &RunResult<T>| result.schema == SCHEMA && result.version == VERSION;
+            Ok(serde_json::from_slice(&text).ok().filter(is_ours))
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error).with_context(|| path.display().to_string()),

@@ -23,7 +23,8 @@ use zenoh::{
 };
 
 use crate::{
-    Alive, BusError, Credentials, Endpoint, Gap, HeldLease, History, Hold, Published, Subscription, config,
+    Alive, BusError, Credentials, Endpoint, Gap, HeldLease, History, Hold, Listener, Published, Subscription,
+    config,
     error::of_zenoh,
     liveness::{Known, Roster, Trust},
     topic::encoding,
@@ -179,6 +180,20 @@ impl Client {
     pub async fn subscribe<M: Published>(&self, history: History) -> Result<Subscription<M>, BusError> {
         let Caller { session, keys, trust } = &self.caller;
         Subscription::declare(session, keys, history, trust.clone()).await
+    }
+
+    /// Gives each message of a topic to `hear` in the thread that received it, from now on, until the listener is dropped. No queue and no
+    /// other thread is between; in return nothing else of this connection arrives before `hear` returns, so that it must not wait. What was
+    /// missed is not fetched: a frame's own sequence number shows it. Messages of others than the rig's service are dropped and counted.
+    ///
+    /// # Errors
+    /// [`BusError::Key`] if the session is closed.
+    pub async fn listen<M: Published>(
+        &self,
+        hear: impl Fn(M) + Send + Sync + 'static,
+    ) -> Result<Listener, BusError> {
+        let Caller { session, keys, trust } = &self.caller;
+        Listener::declare(session, keys, trust.clone(), hear).await
     }
 
     /// Asks once more for messages that a subscription misses: [`Subscription::gap`]. Gives those that their publisher still keeps, in

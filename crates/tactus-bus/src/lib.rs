@@ -1,7 +1,8 @@
 //! The bus between the service and its clients, based on zenoh: published messages, commands and liveliness.
 //!
 //! The service opens a [`Node`], puts each of its rigs on it as a [`Bus`], and hands out [`Publisher`]s, whose calls never
-//! wait; it receives commands as [`CommandCall`]s. A client uses [`Client::connect`], [`Client::command`] and [`Client::subscribe`]; a [`Lab`] has clients of many rigs over one
+//! wait; it receives commands as [`CommandCall`]s. A client uses [`Client::connect`], [`Client::command`] and [`Client::subscribe`] or, where each moment counts,
+//! [`Client::listen`]; a [`Lab`] has clients of many rigs over one
 //! connection. Keys, messages and encoding are those
 //! of `tactus-schema`, so any zenoh client in any language can take part.
 //!
@@ -38,6 +39,7 @@ mod denial;
 mod endpoint;
 mod error;
 mod lease;
+mod listener;
 mod liveness;
 mod merge;
 mod node;
@@ -56,6 +58,7 @@ pub use config::{BusConfig, Credentials, TlsConfig};
 pub use endpoint::Endpoint;
 pub use error::BusError;
 pub use lease::{HeldLease, Hold};
+pub use listener::Listener;
 pub use liveness::{Alive, AliveToken};
 pub use node::Node;
 pub use publisher::Publisher;

@@ -126,6 +126,9 @@ impl Trust {
 
     /// As [`Trust::has`], once a session speaks for the rig; `None` once the client is closed. Cancel-safe.
     pub(crate) async fn wait(&mut self, session: &ZenohId) -> Option<bool> {
+        if let Some(has) = self.has(session) {
+            return Some(has);
+        }
         let rig = self.rig.clone();
         self.known
             .wait_for(|known| known.believes(&rig, session).is_some())

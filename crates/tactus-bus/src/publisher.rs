@@ -1,6 +1,6 @@
 //! Publishing: calls that never wait, and the publishers of a rig's topics.
 
-use std::{sync::Arc, time::Duration};
+use std::sync::Arc;
 
 use tactus_schema::{
     Frame,
@@ -20,10 +20,6 @@ use crate::{
     queue::Queue,
     topic::{Lane, Policy, encoding, message_name},
 };
-
-/// Period at which a topic's last sequence number is sent, so that a client notices that it missed the last message of a burst. A topic
-/// that is repeated anyway needs none.
-const HEARTBEAT: Duration = Duration::from_millis(500);
 
 /// Room for what a frame has beside its counts; where elements are bad, it may take more.
 const FRAME_BYTES: usize = 64;
@@ -134,7 +130,7 @@ impl TopicPublisher {
         let key = keys.topic(topic);
         let encoding = encoding(message_name(topic));
         let numbered = MissDetectionConfig::default();
-        let detection = if policy.is_repeated { numbered } else { numbered.heartbeat(HEARTBEAT) };
+        let detection = if let Some(period) = policy.heartbeat { numbered.heartbeat(period) } else { numbered };
         let publisher = session
             .declare_publisher(key.clone())
             .encoding(encoding.clone())

@@ -5,16 +5,14 @@ use std::{
     marker::PhantomData,
     mem,
     ops::RangeInclusive,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
 
 use tactus_schema::key::Keys;
 use zenoh::{
     Session,
+    bytes::Encoding,
     query::{ConsolidationMode, QueryTarget, ReplyKeyExpr},
     sample::Sample,
     session::EntityGlobalId,
@@ -23,6 +21,7 @@ use zenoh_ext::{AdvancedSubscriber, AdvancedSubscriberBuilderExt, RecoveryConfig
 
 use crate::{
     BusError, Published,
+    listener::Foreign,
     liveness::Trust,
     merge::{Merge, Numbered},
     queue::Queue,
@@ -76,6 +75,8 @@ pub struct Gap {
 pub struct Subscription<M> {
     reception: Arc<Reception>,
     trust: Trust,
+    /// The encoding of its messages.
+    expected: Encoding,
     /// The last message that was given out of each of the latest publishers.
     last: HashMap<EntityGlobalId, u32>,
     publishers: usize,
@@ -93,8 +94,7 @@ pub struct Subscription<M> {
 struct Reception {
     merge: Mutex<Merge<EntityGlobalId, Sample>>,
     arrived: Queue<Sample>,
-    /// Messages of others than the service.
-    foreign: AtomicU64,
+    foreign: Foreign,
 }
 
 impl Gap {
@@ -147,7 +147,7 @@ impl<M: Published> Subscription<M> {
                 ARRIVED_BYTES_MAX,
                 |sample: &Sample| sample.payload().len(),
             ),
-            foreign: AtomicU64::new(0),
+            foreign: Foreign::default(),
         });
         let receiver = Receiver(reception.clone(), trust.clone());
         let builder =
@@ -161,6 +161,7 @@ impl<M: Published> Subscription<M> {
         Ok(Self {
             reception,
             trust,
+            expected: encoding(M::NAME),
             last: HashMap::new(),
             publishers: 0,
             gap: None,
@@ -174,11 +175,10 @@ impl<M: Published> Subscription<M> {
     /// The next message; `None` once the client is closed. If the service restarts, the subscription continues: see
     /// [`crate::Client::alive`]. Cancel-safe.
     pub async fn recv(&mut self) -> Option<M> {
-        let expected = encoding(M::NAME);
         loop {
             let sample = self.next_of_service().await?;
             self.count(&sample);
-            if *sample.encoding() == expected
+            if *sample.encoding() == self.expected
                 && let Ok(message) = M::decode(&*sample.payload().to_bytes())
             {
                 return Some(message);
@@ -206,7 +206,7 @@ impl<M: Published> Subscription<M> {
             if is_own {
                 return sample;
             }
-            self.reception.drop_foreign();
+            self.reception.foreign.count();
         }
     }
 
@@ -224,7 +224,7 @@ impl<M: Published> Subscription<M> {
     /// Compares the message's number with the last one of its publisher.
     fn count(&mut self, sample: &Sample) {
         self.gap = None;
-        let Some((publisher, number)) = numbered(sample.clone()).origin else { return };
+        let Some((publisher, number)) = origin(sample) else { return };
         let due = if let Some(last) = self.last.insert(publisher, number) {
             last.wrapping_add(1)
         } else {
@@ -246,7 +246,7 @@ impl<M: Published> Subscription<M> {
             missed: self.reception.merge.lock().unwrap_or_else(PoisonError::into_inner).missed(),
             overrun: self.reception.arrived.dropped(),
             unreadable: self.unreadable,
-            foreign: self.reception.foreign.load(Ordering::Relaxed),
+            foreign: self.reception.foreign.number(),
         }
     }
 }
@@ -289,10 +289,12 @@ async fn ask(
 }
 
 fn numbered(sample: Sample) -> Numbered<EntityGlobalId, Sample> {
-    Numbered {
-        origin: sample.source_info().map(|source| (*source.source_id(), source.source_sn())),
-        item: sample,
-    }
+    Numbered { origin: origin(&sample), item: sample }
+}
+
+/// Who sent a message, and its number.
+fn origin(sample: &Sample) -> Option<(EntityGlobalId, u32)> {
+    sample.source_info().map(|source| (*source.source_id(), source.source_sn()))
 }
 
 impl Reception {
@@ -304,14 +306,6 @@ impl Reception {
     fn join(&self, past: Vec<Numbered<EntityGlobalId, Sample>>) {
         let mut merge = self.merge.lock().unwrap_or_else(PoisonError::into_inner);
         merge.join(past, |sample| self.keep(sample));
-    }
-
-    /// Counts a message of another than the service; one line each time the count doubles, to limit the log.
-    fn drop_foreign(&self) {
-        let foreign = self.foreign.fetch_add(1, Ordering::Relaxed) + 1;
-        if foreign.is_power_of_two() {
-            tracing::warn!(foreign, "messages that are not the service's are dropped");
-        }
     }
 
     fn keep(&self, sample: Sample) {
@@ -328,7 +322,7 @@ impl Receiver {
     fn hear(&self, sample: Sample) {
         let source = sample.source_info().map(|source| source.source_id().zid());
         if source.is_none_or(|source| self.1.has(&source) == Some(false)) {
-            self.0.drop_foreign();
+            self.0.foreign.count();
         } else {
             self.0.hear(sample);
         }

@@ -1,5 +1,7 @@
 //! The message on each topic, and its queue, history and priority.
 
+use std::time::Duration;
+
 use tactus_schema::{Message, key::Topic, pb};
 use zenoh::{bytes::Encoding, qos::Priority};
 
@@ -42,9 +44,9 @@ pub(crate) struct Policy {
     pub(crate) lane: Lane,
     /// Messages kept for clients that join late or missed some.
     pub(crate) kept: Kept,
-    /// True if the service sends the topic anew every second or more often, whatever happens: who missed a message needs no other sign of
-    /// it than the next.
-    pub(crate) is_repeated: bool,
+    /// Period at which the last message's number is sent, so that a client notices that it missed the last message of a burst. `None` for a
+    /// topic that is sent anew every second or more often, whatever happens: the next message shows it.
+    pub(crate) heartbeat: Option<Duration>,
     /// Each class has its own priority: zenoh holds a lock per client and priority while it waits for room, and history
     /// replies use [`Priority::Data`], so nothing here uses that.
     pub(crate) priority: Priority,
@@ -90,22 +92,29 @@ impl Kept {
     }
 }
 
+/// Heartbeat of a topic whose messages come when something happens.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+/// Heartbeat of a topic that flows: it shows the last message before the device ended. Of a thousand rigs each would be a load.
+const HEARTBEAT_OF_A_FLOW: Duration = Duration::from_secs(2);
+
 impl Policy {
     pub(crate) const fn of(topic: Topic) -> Self {
+        let flow = Some(HEARTBEAT_OF_A_FLOW);
         match topic {
             Topic::SensorFrame => {
                 let priority = Priority::DataHigh;
-                Self { lane: Lane::Frames, kept: Kept::AsFrames, is_repeated: false, priority }
+                Self { lane: Lane::Frames, kept: Kept::AsFrames, heartbeat: flow, priority }
             }
-            Topic::StageState => Self::update(Kept::AsFrames),
+            Topic::StageState => Self { heartbeat: flow, ..Self::update(Kept::AsFrames) },
             Topic::RunEvent => Self::update(Kept::Last(16_384)),
             Topic::SensorInfo | Topic::SafetyState => Self::update(Kept::Last(256)),
-            Topic::RunState | Topic::Health => Self { is_repeated: true, ..Self::update(Kept::Last(1)) },
+            Topic::RunState | Topic::Health => Self { heartbeat: None, ..Self::update(Kept::Last(1)) },
         }
     }
 
     const fn update(kept: Kept) -> Self {
-        Self { lane: Lane::Updates, kept, is_repeated: false, priority: Priority::InteractiveLow }
+        let heartbeat = Some(HEARTBEAT);
+        Self { lane: Lane::Updates, kept, heartbeat, priority: Priority::InteractiveLow }
     }
 }
 

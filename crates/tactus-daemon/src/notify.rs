@@ -28,7 +28,7 @@ const WAITING_MAX: usize = 4;
 pub(crate) struct Systemd(SyncSender<Message>);
 
 /// What systemd is told.
-#[derive(Debug)]
+#[derive(Debug, PartialEq, Eq)]
 enum Message {
     Ready { status: String },
     Status(String),
@@ -103,24 +103,26 @@ pub(crate) async fn feed_watchdog(desks: RunningDesks, systemd: Systemd) {
             at.ok().and_then(|at| desks.get(at)).is_some_and(|(_, desk)| Arc::ptr_eq(desk, &of.desk))
         };
         watched.retain(|rig, of| is_there(rig, of));
-        let (mut hanging, mut still_hanging) = (0, 0);
-        for (rig, desk) in &desks {
-            let watched = watched.entry(Arc::clone(rig)).or_insert_with(|| WatchedRig::new(desk, limit / 2));
-            match watched.look(rig) {
-                Liveness::Alive | Liveness::Recovered => {}
-                Liveness::Hangs(_) => hanging += 1,
-                Liveness::StillHangs(_) => still_hanging += 1,
-            }
-        }
-        if asked.is_none() {
-            continue;
-        }
-        if desks.is_empty() || hanging + still_hanging < desks.len() {
-            systemd.tell(Message::Alive);
-        } else if still_hanging == desks.len() {
-            systemd.tell(Message::Hangs);
+        let mut look = |(rig, desk): &(Arc<str>, Arc<CommandDesk>)| {
+            watched.entry(Arc::clone(rig)).or_insert_with(|| WatchedRig::new(desk, limit / 2)).look(rig)
+        };
+        let seen: Vec<_> = desks.iter().map(&mut look).collect();
+        if asked.is_some()
+            && let Some(message) = of_all(&seen)
+        {
+            systemd.tell(message);
         }
     }
+}
+
+/// What systemd is told of all rigs together, if anything.
+fn of_all(rigs: &[Liveness]) -> Option<Message> {
+    let hangs = |rig: &Liveness| matches!(rig, Liveness::Hangs(_) | Liveness::StillHangs(_));
+    if rigs.is_empty() || !rigs.iter().all(hangs) {
+        return Some(Message::Alive);
+    }
+    let still_hangs = |rig: &Liveness| matches!(rig, Liveness::StillHangs(_));
+    rigs.iter().all(still_hangs).then_some(Message::Hangs)
 }
 
 /// A rig, as the watchdog sees it.

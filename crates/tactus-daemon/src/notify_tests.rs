@@ -34,6 +34,21 @@ fn each_part_that_hangs_alone_is_named_and_forgiven_only_by_progress() {
 }
 
 #[test]
+fn systemd_restarts_the_service_only_if_every_rig_hangs_and_still_does() {
+    let (alive, back) = (Liveness::Alive, Liveness::Recovered);
+    let (hangs, still) = (Liveness::Hangs("acquisition"), Liveness::StillHangs("the recorder"));
+    for one_lives in [&[][..], &[alive], &[back], &[hangs, alive], &[still, still, back], &[alive, still]] {
+        assert_eq!(of_all(one_lives), Some(Message::Alive), "{one_lives:?}");
+    }
+    for just_now in [&[hangs][..], &[still, hangs]] {
+        assert_eq!(of_all(just_now), None, "{just_now:?}");
+    }
+    for for_a_while in [&[still][..], &[still, still]] {
+        assert_eq!(of_all(for_a_while), Some(Message::Hangs), "{for_a_while:?}");
+    }
+}
+
+#[test]
 fn a_part_with_nothing_to_do_does_not_hang() {
     let mut watch = Watch::new(at_ms(0), PATIENCE);
     let idle = Progress { stage: None, recorder: None, ..everything_at(1_500) };

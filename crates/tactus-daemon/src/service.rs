@@ -40,6 +40,7 @@ use clap::{CommandFactory, Parser};
 use tactus_bus::{BusConfig, BusError, Node, TlsConfig};
 use tactus_log::LogFormat;
 use tactus_runner::config::{ConfigError, ServiceConfig, TlsSection};
+use tactus_runner::open_files;
 use tactus_runner::signals::EndingSignals;
 #[cfg(feature = "otel")]
 use tactus_schema::MonoTime;
@@ -162,6 +163,7 @@ async fn serve(mut config: ServiceConfig) -> Result<(), ServiceError> {
     // Before a device is opened, so that no signal leaves the tip where it is.
     let mut signals = EndingSignals::listen().map_err(system("signals"))?;
 
+    open_files::allow_all();
     let systemd = Systemd::start().map_err(system("thread"))?;
     let names = names(&config);
     let simulated = config.rigs.served.iter().all(|files| files.rig.simulated);

@@ -17,13 +17,13 @@ use std::time::Instant;
 
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
-use prost::Message as _;
 use serde_json::json;
 use synthetic::{Plan, Run};
 use tactus_record::Recording;
-use tactus_schema::{Frame, MonoTime, WallTime, pb};
+use tactus_schema::{Frame, MonoTime, WallTime};
 
-const INTERVAL_NS: i64 = 33_333_333;
+/// A little more than 1/30 s: 15 of them fill a chunk of Tactus, as they do one of the peer.
+const INTERVAL_NS: i64 = 33_333_334;
 const CHUNK_FRAMES: usize = 15;
 const SYNC_FRAMES: usize = 30;
 const ROUNDS: usize = 5;
@@ -111,7 +111,7 @@ fn bare(frames: &[Frame], path: &Path, sync: bool) -> Measured {
     let mut encoded = Vec::new();
     for (number, frame) in frames.iter().enumerate() {
         encoded.clear();
-        pb::Frame::from(frame).encode(&mut encoded)?;
+        frame.encode(&mut encoded);
         let at_ns = u64::try_from(frame.received.wall.ns())?;
         let sequence = u32::try_from(number)?;
         let header = MessageHeader { channel_id: channel, sequence, log_time: at_ns, publish_time: at_ns };

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`config`] | the configuration and rig files |
 //! | [`experiments`] | finds scripts by name |
+//! | [`open_files`] | how many files a process may have open |
 //! | [`order`] | turns a request into a checked order with its run id and recording |
 //! | [`devices`] | transports, drivers and virtual devices of a rig |
 //! | [`recorder`] | writes the recording for the engine |
@@ -23,6 +24,7 @@ pub mod crashed;
 pub mod devices;
 pub mod embedded;
 pub mod experiments;
+pub mod open_files;
 pub mod order;
 pub mod recorder;
 pub mod rehearsal;

@@ -65,6 +65,18 @@ impl Lab {
         presses: usize,
         gain: f64,
     ) -> PathBuf {
+        self.record_with_rises(rig, run_id, started_ns, presses, |rise| gain * rise)
+    }
+
+    /// The same with a sensor that shows another rise for each, in counts.
+    pub(crate) fn record_with_rises(
+        &self,
+        rig: &str,
+        run_id: &str,
+        started_ns: i64,
+        presses: usize,
+        shown: impl Fn(f64) -> f64,
+    ) -> PathBuf {
         let mut run = Plan { run_id: run_id.to_owned(), ..Plan::short(presses) }.make();
         rig.clone_into(&mut run.rig.name);
         let path = self.path(&format!("runs/{run_id}/recording.mcap"));
@@ -87,7 +99,7 @@ impl Lab {
         let mut recording = Recording::create(&path, &header).unwrap();
         for fed in &mut run.fed {
             match fed {
-                Fed::Frame(frame) => frame.counts = amplified(&frame.counts, gain),
+                Fed::Frame(frame) => frame.counts = with_rises(&frame.counts, &shown),
                 Fed::Info(info, _) => rig.clone_into(&mut info.rig),
                 Fed::Stage(_) | Fed::Event(_) => {}
             }
@@ -126,10 +138,10 @@ impl Lab {
     }
 }
 
-/// Counts whose rises above the baseline of 100 are multiplied.
-fn amplified(counts: &[f32], gain: f64) -> Arc<[f32]> {
+/// Counts with other rises above the baseline of 100.
+fn with_rises(counts: &[f32], shown: impl Fn(f64) -> f64) -> Arc<[f32]> {
     #[expect(clippy::cast_possible_truncation, reason = "counts are of single precision")]
-    counts.iter().map(|counts| (100.0 + gain * (f64::from(*counts) - 100.0)) as f32).collect()
+    counts.iter().map(|counts| (100.0 + shown(f64::from(*counts) - 100.0)) as f32).collect()
 }
 
 fn collect(root: &Path, folder: &Path, files: &mut Vec<String>) {

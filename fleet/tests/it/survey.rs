@@ -1,5 +1,5 @@
 //! Calibration and discovery of all runs: what drifts, what is shared, what is kept.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::fs;
 
@@ -53,10 +53,17 @@ fn the_sensor_that_drifts_is_found_and_what_was_done_is_kept() {
     let again = survey(&lab, "calibrate");
     assert_eq!((&again["runs_analysed"], &again["runs_kept"]), (&0.into(), &10.into()));
     assert_eq!(again["drifts"], told["drifts"]);
-    // A result that is missing or cut off is made again.
+    // A result that is cut off, or of another version of the program, is made again.
     let result = lab.path("survey/calibration/rig=left/date=2026-03-25/20260325-120000-left.json");
-    fs::write(&result, "{").unwrap();
-    assert_eq!(survey(&lab, "calibrate")["runs_analysed"], 1);
+    let made = fs::read_to_string(&result).unwrap();
+    let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
+    let of_another = made.replace(&version, "\"version\": \"0.0.1\"");
+    assert_ne!(of_another, made);
+    for damaged in ["{", &of_another] {
+        fs::write(&result, damaged).unwrap();
+        assert_eq!(survey(&lab, "calibrate")["runs_analysed"], 1);
+        assert_eq!(fs::read_to_string(&result).unwrap(), made);
+    }
 }
 
 #[test]
@@ -67,6 +74,31 @@ fn runs_that_show_nothing_are_told_and_not_searched_again() {
     assert_eq!(told["runs_analysed"], 3);
     let again = survey(&lab, "discover");
     assert_eq!((&again["runs_analysed"], &again["refused"]), (&0.into(), &told["refused"]));
+}
+
+#[test]
+fn an_effect_that_two_of_three_rigs_have_is_found_in_their_recordings_and_told_as_shared() {
+    let lab = Lab::new();
+    // An amplifier of two rigs that ends at 1,500 counts.
+    let ends = |rise: f64| rise / (1.0 + rise.max(0.0) / 1500.0);
+    lab.record_with_rises("left", "20260325-120000-left", NOON_NS, 48, ends);
+    lab.record_with_rises("right", "20260325-120000-right", NOON_NS, 48, ends);
+    lab.record("far", "20260325-120000-far", NOON_NS, 48);
+    lab.ingest();
+    let told = survey(&lab, "discover");
+    assert_eq!(told["runs_analysed"], 3, "{told}");
+    let of = |effect: &str| {
+        let effects = told["effects"].as_array().unwrap();
+        effects.iter().find(|missing| missing["effect"] == effect).unwrap_or_else(|| panic!("{effect}: {told}"))
+    };
+    let rigs = |effect: &Value| -> Vec<String> {
+        let rigs = effect["rigs"].as_array().unwrap();
+        rigs.iter().map(|at| at["rig"].as_str().unwrap().to_owned()).collect()
+    };
+    let saturation = of("saturation");
+    assert_eq!((rigs(saturation), &saturation["shared"]), (vec!["left".into(), "right".into()], &true.into()));
+    let page = fs::read_to_string(lab.path("survey/report.html")).unwrap();
+    assert!(page.contains("saturation"), "{page}");
 }
 
 /// A worker that calibrates one run after the other.

@@ -221,6 +221,9 @@ async fn behind_a_router_frames_of_another_publisher_are_dropped_and_counted() {
     let (_router, endpoint, mut service) = behind_a_router().await;
     let client = connected(&endpoint, "bench").await;
     let mut frames = client.subscribe::<pb::Frame>(History::None).await.unwrap();
+    let (heard, mut listened) = mpsc::unbounded_channel();
+    let hear = move |frame: pb::Frame| heard.send(frame.seq).unwrap();
+    let listener = client.listen(hear).await.unwrap();
     settled(&client, &mut service.calls).await;
     let session = raw_session(&endpoint).await;
     let fake = pb::Frame::from(&frame(666)).encode_to_vec();
@@ -243,6 +246,11 @@ async fn behind_a_router_frames_of_another_publisher_are_dropped_and_counted() {
         seq += 1;
     }
     assert_eq!(frames.losses().foreign, 100);
+    service.bus.publisher().publish_frame(&frame(seq));
+    for heard in 0..=seq {
+        assert_eq!(listened.recv().await, Some(heard));
+    }
+    assert_eq!((listener.foreign(), listener.unreadable()), (100, 0));
     service.bus.close().await.unwrap();
 }
 

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Readings whose memory is kept; a service holds a few at a time.
-const KEPT_MAX: usize = 64;
+/// Readings whose memory is kept. A recorder holds what came in 100 ms: 3 at 30 Hz, 500 at 5 kHz.
+const KEPT_MAX: usize = 1024;
 
 /// Makes the counts of a reading, once nobody holds that of an earlier one any more, in its memory.
 #[derive(Debug, Default)]

@@ -1,3 +1,5 @@
+use std::collections::HashSet;
+
 use super::*;
 
 #[test]
@@ -14,4 +16,21 @@ fn memory_is_used_again_only_when_nobody_holds_it() {
     // Nobody holds the second, but it has another length.
     drop(second);
     assert_eq!(memory.counts(3, |counts| counts.fill(4.0))[..], [4.0, 4.0, 4.0]);
+}
+
+#[test]
+fn memory_is_used_again_while_a_recorder_holds_100_ms_of_5_khz() {
+    let (mut memory, mut held) = (Memory::default(), VecDeque::new());
+    let mut next = || {
+        if held.len() == 500 {
+            held.pop_front();
+        }
+        let counts = memory.counts(48, |counts| counts.fill(1.0));
+        let place = counts.as_ptr();
+        held.push_back(counts);
+        place
+    };
+    let first: HashSet<_> = (0..500).map(|_| next()).collect();
+    let later: HashSet<_> = (0..5_000).map(|_| next()).collect();
+    assert_eq!(later, first);
 }

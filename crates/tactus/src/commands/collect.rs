@@ -18,6 +18,7 @@ use std::time::Duration;
 use anyhow::Context;
 use serde_json::json;
 use tactus_bus::{BusError, Lab};
+use tactus_runner::open_files;
 use tactus_runner::signals::EndingSignals;
 use tokio::sync::watch;
 use tokio::task::{JoinError, JoinSet};
@@ -42,6 +43,7 @@ pub(crate) fn collect(common: &Common, args: &CollectArgs) -> anyhow::Result<Exi
         return Err(Failure::new(Exit::Usage, format!("--seconds must be positive, not {seconds}")).into());
     }
     let named: BTreeSet<String> = args.rigs.iter().chain(&common.rig).cloned().collect();
+    open_files::allow_all();
     let runtime = connection::runtime()?;
     let (collected, problems) = runtime.block_on(async {
         // Before a file is begun, so that no signal leaves it without its end.
