@@ -320,15 +320,15 @@ bench-discovery: bench-peers-tools
         json.dump({who: json.load(open(f"{at}{who}.json")) for who in ("ours", "peers")}, open(f"{at}costs.json", "w"), indent=1)'
     cat target/evidence/costs.json
 
-# The same tables from a first look at sealed sets: every physics once, strong, some 240 sets in half an hour on two cores.
+# The same tables from a first look at tuning sets, printed: every physics once, strong, some 240 sets in half an hour on two cores.
 discovery-glance:
     cargo build --profile dist --package tactus --package tactus-bench
-    target/dist/tactus-bench evidence run --seeds sealed --size glance --work target/evidence/glance/work \
-        --labels target/evidence/glance/labels
-    target/dist/tactus-bench evidence separate --seeds sealed --size glance --work target/evidence/glance/work \
-        --labels target/evidence/glance/labels
-    target/dist/tactus-bench evidence score --seeds sealed --size glance --work target/evidence/glance/work \
-        --labels target/evidence/glance/labels --document docs/discovery-evidence.md --images docs/images
+    target/dist/tactus-bench evidence run --size glance --work target/evidence/glance/tuning/work \
+        --labels target/evidence/glance/tuning/labels > /dev/null
+    target/dist/tactus-bench evidence separate --size glance --work target/evidence/glance/tuning/work \
+        --labels target/evidence/glance/tuning/labels
+    target/dist/tactus-bench evidence score --size glance --work target/evidence/glance/tuning/work \
+        --labels target/evidence/glance/tuning/labels
 
 # Some 15 minutes on two cores; reports are in a folder for each build, so a rerun goes on where it ended.
 # What discovery finds in 42 sets that another program makes, which shares no code with ours: docs/discovery-evidence.md.
@@ -362,8 +362,9 @@ discovery-quick: build
     target/debug/tactus-bench evidence run --size quick --tactus target/debug/tactus \
         --work target/evidence/quick/work --labels target/evidence/quick/labels
 
-# What the constants of the search rest on, from the same sets: how often sets of twins hold the hidden class, how large the odds of wrong
-# classes are, and how near rivals without a name come.
+# What constants of the search and of the verdict rest on, from the same sets: how often sets of twins hold the hidden class, how large the odds
+# of wrong classes are, how much of a gap right and wrong names close, and how near rivals without a name come. Where each of the others comes
+# from is listed in the pages of the modules of crates/tactus-discover.
 discovery-constants: discovery-quick
     target/debug/tactus-bench evidence constants --size quick \
         --work target/evidence/quick/work --labels target/evidence/quick/labels

@@ -6,6 +6,7 @@
 //! [`document()`] and [`pictures()`] present them. Any number of workers share the sets of a folder ([`tactus_work`]).
 
 mod ablation;
+mod bounds;
 mod campaign;
 mod constants;
 mod contests;
@@ -24,7 +25,8 @@ mod timing;
 mod twins;
 
 pub use ablation::{Ablation, ablations};
-pub use campaign::{Campaign, Planned, Seeds, Sizes, campaigns};
+pub use bounds::{Bounds, Counts};
+pub use campaign::{Campaign, Planned, Seeds, Size, Sizes, campaigns};
 pub use constants::{Observed, Place, constants_table};
 pub use contests::{Contest, contests, contests_table};
 pub use document::{Costs, Part, document, into_document, misses};

@@ -4,12 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use tactus_bench::evidence::{
-    self, Ablation, Campaign, Costs, Form, Observed, Outcome, Places, Planned, Scores, Seeds, Sizes, TWINS,
-    Timing, Workflow, ablations, campaigns, constants_table, contests, contests_table, document, forms_table,
-    into_document, misses, moments, pictures, progress_table, quantile, read, run, separate, summary,
-    twins_table,
+    self, Ablation, Bounds, Campaign, Costs, Counts, Form, Observed, Outcome, Places, Planned, Scores, Seeds,
+    Size, Sizes, TWINS, Timing, Workflow, ablations, campaigns, constants_table, contests, contests_table,
+    document, forms_table, into_document, misses, moments, pictures, progress_table, read, run, separate,
+    summary, twins_table,
 };
 use tactus_work::write_whole;
 
@@ -150,52 +150,6 @@ struct WhichArgs {
     images: Option<PathBuf>,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Size {
-    Whole,
-    Ablation,
-    Glance,
-    Quick,
-    Slice,
-    Sample,
-}
-
-/// Bounds of the slice: 12 sets without physics, 24 with one effect, 4 with two and 6 outside the library. A program that meets its
-/// targets breaks each bound in 0.6 to 4 % of random slices. This slice is not random: it is always the same.
-struct Bounds {
-    /// Expected: 2.8 % of 12, 0.3. Two or more have a probability of 4 %.
-    false_alarms_most: usize,
-    /// Expected: 95 % of 24, 22.8. 19 or fewer have a probability of 0.6 %.
-    exact_least: usize,
-    /// Expected: 85 % of 4, 3.4. One or none has a probability of 1.2 %.
-    pairs_least: usize,
-    /// Expected: 5 % of 34, 1.7. Five or more have a probability of 2.6 %.
-    wrong_most: usize,
-    /// Outside the library, detected. Expected: 90 % of 6, 5.4. Three or fewer have a probability of 1.6 %.
-    seen_least: usize,
-    /// Shrink over that of the effect's own fit, in sets with one effect: median and fifth percentile.
-    shrink_least: [f64; 2],
-}
-
-const BOUNDS: Bounds = Bounds {
-    false_alarms_most: 1,
-    exact_least: 20,
-    pairs_least: 2,
-    wrong_most: 4,
-    seen_least: 4,
-    shrink_least: [0.97, 0.7],
-};
-
-/// The sample is the first 3, 6, 1 and 1 of the slice's sets, too few for shares: it may miss one name and no more.
-const SAMPLE_BOUNDS: Bounds = Bounds {
-    false_alarms_most: 0,
-    exact_least: 5,
-    pairs_least: 0,
-    wrong_most: 1,
-    seen_least: 1,
-    shrink_least: [0.97, 0.7],
-};
-
 impl EvidenceArgs {
     pub(crate) fn run(self) -> Result<()> {
         match self.part {
@@ -262,10 +216,12 @@ impl RunArgs {
         if !self.check {
             return Ok(());
         }
+        let counts = Counts::of(&outcomes);
+        println!("{}\n{counts}", summary(&outcomes));
         match self.which.size {
-            Size::Sample => SAMPLE_BOUNDS.check(&outcomes),
+            Size::Sample => Bounds::SAMPLE.check(&counts),
             Size::Whole | Size::Ablation | Size::Glance | Size::Quick | Size::Slice => {
-                BOUNDS.check(&outcomes)
+                Bounds::SLICE.check(&counts)
             }
         }
     }
@@ -282,15 +238,7 @@ impl SeparateArgs {
 
 impl WhichArgs {
     fn sets(&self) -> Vec<Planned> {
-        let mut sizes = match self.size {
-            Size::Whole => Sizes::whole(),
-            Size::Ablation => Sizes::ablation(),
-            Size::Glance => Sizes::glance(),
-            Size::Quick => Sizes::quick(),
-            Size::Slice => Sizes::slice(),
-            Size::Sample => Sizes::sample(),
-        };
-        sizes.frames = self.frames;
+        let sizes = Sizes { frames: self.frames, ..self.size.sizes() };
         let chosen = if self.campaign.is_empty() { &Campaign::ALL[..] } else { &self.campaign };
         let sets = chosen.iter().flat_map(|campaign| campaigns(*campaign, &sizes, self.seeds));
         sets.filter(|set| self.only.as_ref().is_none_or(|part| set.id.contains(part))).collect()
@@ -331,8 +279,9 @@ impl WhichArgs {
     fn check_seeds(&self) -> Result<()> {
         let is_part = self.only.is_some() || !self.campaign.is_empty();
         ensure!(
-            self.seeds == Seeds::Tuning || !is_part,
-            "sealed sets are run all together: leave out --only and --campaign, or take --seeds tuning"
+            self.seeds.may_show(self.size, is_part),
+            "sealed sets are run all together: leave out --only and --campaign, and give no --size but whole or ablation; or take --seeds \
+             tuning"
         );
         Ok(())
     }
@@ -387,41 +336,6 @@ impl WhichArgs {
             }
         }
         Ok(outcomes)
-    }
-}
-
-impl Bounds {
-    fn check(&self, outcomes: &[Outcome]) -> Result<()> {
-        let count = |campaign, is_so: fn(&Outcome) -> bool| {
-            outcomes.iter().filter(|set| set.campaign == campaign && is_so(set)).count()
-        };
-        let false_alarms = count(Campaign::FalseAlarms, |set| set.is_detected() || set.has_failed());
-        let exact = count(Campaign::Names, Outcome::is_exact);
-        let pairs = count(Campaign::Pairs, Outcome::names_all);
-        let is_wrong = |set: &Outcome| !set.wrong_names().is_empty();
-        let wrong = count(Campaign::Names, is_wrong)
-            + count(Campaign::Pairs, is_wrong)
-            + count(Campaign::Outside, is_wrong);
-        let seen = count(Campaign::Outside, Outcome::is_detected);
-        let named = outcomes.iter().filter(|set| set.campaign == Campaign::Names);
-        let shrinks: Vec<f64> = named.filter_map(Outcome::shrink_to_own_fit).collect();
-        println!("{}", summary(outcomes));
-        println!(
-            "false alarms {false_alarms}, exact {exact}, pairs {pairs}, sets with a wrong name {wrong}, outside seen {seen}"
-        );
-        ensure!(false_alarms <= self.false_alarms_most, "more than {} false alarms", self.false_alarms_most);
-        ensure!(exact >= self.exact_least, "fewer than {} sets named exactly", self.exact_least);
-        ensure!(pairs >= self.pairs_least, "fewer than {} pairs with both named", self.pairs_least);
-        ensure!(seen >= self.seen_least, "fewer than {} sets outside the library were seen", self.seen_least);
-        for (which, share, least) in
-            [("median", 0.5, self.shrink_least[0]), ("fifth percentile", 0.05, self.shrink_least[1])]
-        {
-            // The sample may have no set whose gap is known well enough.
-            let Some(shrink) = quantile(shrinks.clone(), share) else { continue };
-            ensure!(shrink >= least, "the shrink's {which} is {shrink:.3}, below {least}");
-        }
-        ensure!(wrong <= self.wrong_most, "more than {} sets with a wrong name", self.wrong_most);
-        Ok(())
     }
 }
 

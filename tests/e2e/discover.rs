@@ -249,18 +249,30 @@ fn is_drafted_and_confirmed(physics: &str, strength: f64, [stage, carrier, covar
     let grown = gap_counts(&new, &diagnosed(folder, &["--truth", "discovery/model.toml"], "2"));
     assert!(without.powi(2) > 5.0 * grown.powi(2), "{without} counts without, {grown} with the draft");
 
-    // Another rig has the draft in its model.
-    fs::create_dir(folder.join("drafts")).unwrap();
-    fs::copy(folder.join("discovery/draft-1.toml"), folder.join("drafts/draft-1.toml")).unwrap();
-    let other = diagnosed(folder, &["--truth", "discovery/model.toml"], "3");
-    let said = tactus(folder, &["--json", "discover", &other, "--library", "drafts", "--out", "other"]);
+    let said = tactus(folder, &["simulate", "--model", "discovery/model.toml", "--scene", "sphere"]);
+    assert!(said.code == Some(0) && said.out.contains("effects   draft-1"), "{said:?}");
+
+    // Another rig, with another sensor, has the same physics at another strength.
+    let library = ["--library", "drafts"];
+    let said = tactus(folder, &[&["effects", "add", "discovery/draft-1.toml"], &library[..]].concat());
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let rig = fs::read_to_string(folder.join("rig.toml")).unwrap();
+    let other_rig =
+        rig.replace("name = \"sim\"", "name = \"other\"").replace("seed = 20100325", "seed = 777");
+    assert_eq!(other_rig.matches("other").count() + other_rig.matches("777").count(), 2, "{other_rig}");
+    fs::write(folder.join("rig.toml"), other_rig).unwrap();
+    let hidden = fs::read_to_string(folder.join("hidden.toml")).unwrap();
+    let weaker = hidden.replace(&format!("{strength:?}"), &format!("{:?}", 0.75 * strength));
+    fs::write(folder.join("weaker.toml"), weaker).unwrap();
+    let other = diagnosed(folder, &["--truth", "weaker.toml"], "3");
+    let said = tactus(folder, &[&["--json", "discover", &other, "--out", "other"], &library[..]].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
     assert_eq!(named(&said.json()), ["draft-1"], "{}", said.json()["draft"]);
 
     fs::write(folder.join("drafts/model.toml"), file.replace("tactus.draft/1", "tactus.model/1")).unwrap();
-    let said = tactus(folder, &["discover", &other, "--library", "drafts", "--out", "refused"]);
+    let said = tactus(folder, &[&["discover", &other, "--out", "refused"], &library[..]].concat());
     assert_eq!(said.code, Some(2), "{said:?}");
-    assert!(said.err.contains("drafts/model.toml: schema: this program reads"), "{said:?}");
+    assert!(said.err.contains("drafts/model.toml: line 1: schema: this program reads"), "{said:?}");
 }
 
 #[test]
@@ -271,6 +283,52 @@ fn a_supply_that_sags_is_drafted_confirmed_and_named_on_another_rig() {
 #[test]
 fn what_the_motors_couple_in_is_drafted_confirmed_and_named_on_another_rig() {
     is_drafted_and_confirmed("stage-pickup", 1.0, ["readout", "counts", "speed of travel"]);
+}
+
+#[test]
+fn a_draft_that_a_new_run_does_not_show_is_refuted_and_the_next_one_has_another_name() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    hide(folder, "supply-droop", 2.0);
+    let first = diagnosed(folder, &["--truth", "hidden.toml"], "1");
+
+    // The experiment runs on a rig without the hidden physics.
+    let without = ["--active", "--embedded", "--rig-file", "rig.toml", "--out", "refuted"];
+    let said = tactus(folder, &[&["discover", &first], &without[..]].concat());
+    assert!(said.code == Some(0) && said.out.contains("\ndraft-1 is refuted: in the new run"), "{said:?}");
+    assert!(said.out.contains("next: `tactus discover FILES --active` measures draft-2 anew"), "{said:?}");
+    let draft_of =
+        |path: &str| DraftFile::from_toml(&fs::read_to_string(folder.join(path)).unwrap()).unwrap();
+    let refuted = draft_of("refuted/draft-1-refuted.toml");
+    assert_eq!((refuted.draft.name.as_str(), refuted.status), ("draft-1", DraftStatus::Refuted));
+    assert_eq!(draft_of("refuted/draft-2.toml").draft.name, "draft-2");
+    assert!(!folder.join("refuted/draft-1.toml").exists(), "{:?}", listed(&folder.join("refuted")));
+
+    // A draft of the library that no measurement has confirmed is measured anew where it is named.
+    let library = ["--library", "drafts"];
+    let unconfirmed = DraftFile { status: DraftStatus::Drafted, confirmation: None, ..refuted };
+    fs::write(folder.join("draft-1.toml"), unconfirmed.to_toml().unwrap()).unwrap();
+    let said = tactus(folder, &[&["effects", "add", "draft-1.toml"], &library[..]].concat());
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let active =
+        ["--active", "--embedded", "--rig-file", "rig.toml", "--truth", "hidden.toml", "--out", "anew"];
+    let said = tactus(folder, &[&["--json", "discover", &first], &active[..], &library[..]].concat());
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let told = &said.json()["settled"];
+    assert!(told[0].as_str().is_some_and(|one| one.starts_with("draft-1 is confirmed")), "{told}");
+    let held =
+        DraftFile::from_toml(&fs::read_to_string(folder.join("drafts/draft-1.toml")).unwrap()).unwrap();
+    assert_eq!(held.status, DraftStatus::Confirmed, "the library's file says so");
+
+    let confirm = |recording: &str| {
+        tactus(folder, &[&["--json", "effects", "confirm", "draft-1", recording], &library[..]].concat())
+    };
+    let said = confirm(&first);
+    assert!(said.code == Some(2) && said.err.is_empty() && said.out.contains("was drafted from"), "{said:?}");
+    assert_eq!(confirm(&diagnosed(folder, &[], "5")).json()["status"], "refuted", "there it does not act");
+    let again = confirm(&diagnosed(folder, &["--truth", "hidden.toml"], "6")).json();
+    assert_eq!((&again["name"], &again["status"]), (&"draft-1".into(), &"confirmed".into()), "{again}");
+    assert_eq!(again["file"], "drafts/draft-1.toml");
 }
 
 /// Names of what is in a folder, in order.

@@ -2,6 +2,7 @@
 
 mod command_line;
 mod configuration;
+mod drafts;
 mod effects;
 mod exit_codes;
 mod manual;

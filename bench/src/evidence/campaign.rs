@@ -29,6 +29,23 @@ pub enum Seeds {
     Sealed,
 }
 
+/// Which part of the recipe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Size {
+    /// All of it.
+    Whole,
+    /// The sets for other methods.
+    Ablation,
+    /// A first look.
+    Glance,
+    /// A short loop for work on the method.
+    Quick,
+    /// What fails if discovery has become worse.
+    Slice,
+    /// The part of that which CI runs.
+    Sample,
+}
+
 /// How many sets of each kind, and how strong.
 #[derive(Debug, Clone)]
 pub struct Sizes {
@@ -103,6 +120,29 @@ impl Seeds {
         match self {
             Self::Tuning => "tuning",
             Self::Sealed => "sealed",
+        }
+    }
+
+    /// True if sets of these seeds may be looked at: sealed ones are the whole recipe or the sets for other methods. Who looks at less
+    /// could choose by it.
+    pub fn may_show(self, size: Size, is_part: bool) -> bool {
+        match self {
+            Self::Tuning => true,
+            Self::Sealed => !is_part && matches!(size, Size::Whole | Size::Ablation),
+        }
+    }
+}
+
+impl Size {
+    /// How many sets that is.
+    pub fn sizes(self) -> Sizes {
+        match self {
+            Self::Whole => Sizes::whole(),
+            Self::Ablation => Sizes::ablation(),
+            Self::Glance => Sizes::glance(),
+            Self::Quick => Sizes::quick(),
+            Self::Slice => Sizes::slice(),
+            Self::Sample => Sizes::sample(),
         }
     }
 }
@@ -182,7 +222,7 @@ impl Sizes {
         }
     }
 
-    /// A few strong sets of every campaign but `Triples`.
+    /// A few strong sets of every campaign but `Triples`. All physics is of other forms than the library's: its own say nothing of these.
     pub fn slice() -> Self {
         Self {
             false_alarms: 12,
@@ -195,11 +235,11 @@ impl Sizes {
         }
     }
 
-    /// The part of the slice that CI runs.
+    /// The part of the slice that CI runs: of every fourth effect, so that each group of effects is in it.
     pub fn sample() -> Self {
         Self {
             false_alarms: 3,
-            physics: one_of_each().take(6).collect(),
+            physics: one_of_each().step_by(4).take(6).collect(),
             pairs: 1,
             outside: outside().take(1).collect(),
             ..Self::slice()
@@ -286,10 +326,10 @@ fn foreign(effect: &str) -> impl Iterator<Item = &'static Definition> {
     within().filter(move |definition| definition.effect == Some(effect) && !definition.is_library_point)
 }
 
-/// The first physics of each effect.
+/// The first form of each effect that the library does not have.
 fn one_of_each() -> impl Iterator<Item = &'static Definition> {
     let mut seen = Vec::new();
-    within().filter(move |definition| {
+    within().filter(|definition| !definition.is_library_point).filter(move |definition| {
         let is_new = !seen.contains(&definition.effect);
         seen.push(definition.effect);
         is_new

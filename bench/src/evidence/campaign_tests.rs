@@ -59,3 +59,28 @@ fn the_sample_is_as_small_as_ci_can_bear() {
     assert_eq!(all(&Sizes::slice()).len(), 12 + 24 + 4 + 6);
     assert_eq!(all(&Sizes::sample()).len(), 3 + 6 + 1 + 1);
 }
+
+#[test]
+fn what_ci_watches_is_of_other_forms_than_the_librarys() {
+    for sizes in [Sizes::sample(), Sizes::slice()] {
+        let points = sizes.physics.iter().filter(|physics| physics.is_library_point);
+        assert_eq!(points.map(|physics| physics.id).collect::<Vec<_>>(), [""; 0]);
+        let effects: BTreeSet<_> = sizes.physics.iter().map(|physics| physics.effect).collect();
+        assert_eq!(effects.len(), sizes.physics.len(), "each effect has one set");
+    }
+}
+
+#[test]
+fn the_sample_is_a_part_of_the_slice() {
+    let slice: BTreeSet<String> = all(&Sizes::slice()).into_iter().map(|set| set.id).collect();
+    assert!(all(&Sizes::sample()).iter().all(|set| slice.contains(&set.id)));
+}
+
+#[test]
+fn sealed_sets_are_run_all_together_or_not_at_all() {
+    let sizes = [Size::Whole, Size::Ablation, Size::Glance, Size::Quick, Size::Slice, Size::Sample];
+    let whole = [true, true, false, false, false, false];
+    assert_eq!(sizes.map(|size| Seeds::Sealed.may_show(size, false)), whole);
+    assert!(sizes.iter().all(|size| !Seeds::Sealed.may_show(*size, true)));
+    assert!(sizes.iter().all(|size| Seeds::Tuning.may_show(*size, true)));
+}

@@ -4,15 +4,13 @@ use std::fmt;
 
 use anyhow::Result;
 use serde::Deserialize;
+use tactus_discover::constants::TAKEN_SHARE;
 use tactus_sets::Label;
 
 use super::campaign::Planned;
 use super::outcome::parsed;
 use super::rate::quantile;
 use super::run::Places;
-
-/// A rival that would take over less than this share of what a class explains hardly acts like it.
-const ALIKE: f64 = 0.3;
 
 /// A class that was added to a model, or would have been, and what a rival without a name does.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,7 +70,11 @@ impl Contest {
         };
         let beside = |rival: &Rivalry| {
             let beside = share(rival.beside_ln_odds);
-            if share(rival.instead_ln_odds) - beside.max(0.0) > ALIKE { beside } else { f64::NEG_INFINITY }
+            if share(rival.instead_ln_odds) - beside.max(0.0) > TAKEN_SHARE {
+                beside
+            } else {
+                f64::NEG_INFINITY
+            }
         };
         Self {
             id: id.into(),

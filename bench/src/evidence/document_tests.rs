@@ -23,6 +23,16 @@ fn a_missed_target_says_by_how_much() {
 }
 
 #[test]
+fn false_alarms_stand_beside_the_level_of_the_tests() {
+    let alarm = Outcome { campaign: Campaign::FalseAlarms, ..set(&[], &[], "unexplained") };
+    let text = document(&Scores::new(&[alarm]), &[], None);
+    let nominal = format!("a nominal level of {}", percent(ALPHA));
+    let line = text.lines().find(|line| line.starts_with("| false alarms")).unwrap_or_default();
+    assert!(line.contains(&nominal) && line.contains("at most 2.8 %"), "{line}");
+    assert!(text.lines().any(|line| line.contains("four tests") && line.contains(&nominal)), "{text}");
+}
+
+#[test]
 fn a_miss_shows_the_hidden_and_the_named_effect() {
     let right = set(&[Some("backlash")], &[("backlash", &[])], "explained");
     let twin = set(&[Some("backlash")], &[("hysteresis", &["backlash"])], "explained");

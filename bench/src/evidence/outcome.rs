@@ -77,6 +77,11 @@ impl Outcome {
         !self.has_failed() && (self.verdict != "nothing-missing" || !self.named.is_empty())
     }
 
+    /// True if something was seen, and no name given to it.
+    pub fn is_unexplained(&self) -> bool {
+        self.verdict == "unexplained" && self.named.is_empty()
+    }
+
     /// True if there is no report, or one that judges nothing.
     pub fn has_failed(&self) -> bool {
         self.verdict == "failed" || self.verdict == "cannot-judge"

@@ -186,7 +186,7 @@ pub struct Several {
 /// Scores of sets with physics outside the library.
 #[derive(Debug, Clone, Serialize)]
 pub struct OutsideScore {
-    /// The verdict is `unexplained`.
+    /// The verdict is `unexplained`, and nothing is named.
     pub unexplained: Rate,
     /// An effect is named.
     pub wrong: Rate,
@@ -312,7 +312,7 @@ impl Several {
 impl OutsideScore {
     fn new(sets: &[&Outcome]) -> Self {
         Self {
-            unexplained: Rate::of(sets, |set| set.verdict == "unexplained"),
+            unexplained: Rate::of(sets, |set| set.is_unexplained()),
             wrong: Rate::of(sets, |set| !set.named.is_empty()),
             partly: Rate::of(sets, |set| set.verdict == "partly-explained"),
             missed: Rate::of(sets, |set| !set.is_detected()),

@@ -130,7 +130,8 @@ impl TopicPublisher {
         let key = keys.topic(topic);
         let encoding = encoding(message_name(topic));
         let numbered = MissDetectionConfig::default();
-        let detection = if let Some(period) = policy.heartbeat { numbered.heartbeat(period) } else { numbered };
+        let detection =
+            if let Some(period) = policy.heartbeat { numbered.heartbeat(period) } else { numbered };
         let publisher = session
             .declare_publisher(key.clone())
             .encoding(encoding.clone())

@@ -4,6 +4,8 @@
 //! Each module uses only those before it: `numbers`, `progress`, `data`, `fit`, `search`, `next`, `verdict`, `discover`. A test holds this:
 //! `xtask/tests/it/modules.rs`.
 
+#[cfg(test)]
+mod constants_tests;
 mod data;
 mod discover;
 mod fit;
@@ -15,7 +17,7 @@ mod progress;
 mod search;
 mod verdict;
 
-pub use data::{DiscoverError, Floor, Frames, Known};
+pub use data::{DiscoverError, Floor, Frames, Known, Mismatch, TooLittle};
 pub use discover::{confirm, discover, predict};
 pub use fit::RunWalks;
 pub use next::{
@@ -27,6 +29,12 @@ pub use search::{
     Rule, TriedEffect,
 };
 pub use tactus_calibrate::{FaultKind, FaultyElement};
+
+/// Constants that `tactus-bench evidence` looks at on tuning sets, and the level of the tests.
+pub mod constants {
+    pub use crate::search::{ALPHA, FORM_SHARE, LEFT_SHARE, MISFIT_SHARE, SET_PROBABILITY, TAKEN_SHARE};
+    pub use crate::verdict::NEAR_CLOSES;
+}
 pub use verdict::{
     AddedEffect, BaseModel, Closed, Confirmation, Discovery, DraftedEffect, ElementGap, Estimated, Final,
     FittedCurve, FittedKnot, GlobalTest, Inclusion, Level, Split, Stair, Structured, Unexplained, Verdict,

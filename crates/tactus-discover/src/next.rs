@@ -16,6 +16,28 @@
 //!
 //! # Source
 //! Designs that discriminate between models: A. C. Atkinson and V. V. Fedorov, *Biometrika* 62 (1975) 57 (T-optimality).
+//!
+//! # Constants
+//!
+//! *Derived*: from other numbers. *Convention*: chosen when it was written, and not changed since; no measurement says how much hangs on it.
+//! *Cost*: a bound of time or memory. *Measured*: on sets, as the reason says. *Tried*: changed after runs on tuning sets, of which no recipe is
+//! kept. *Default*: that of a script. A test compares the values with the code.
+//!
+//! | file | constant | value | kind | reason |
+//! |---|---|---|---|---|
+//! | next.rs | `PROPOSALS_MAX` | `3` | convention | of one question |
+//! | next.rs | `CLEAR_Z` | `20.0` | convention | an experiment of twenty standard errors is long enough; not measured |
+//! | next.rs | `SMALL_SHARE` | `0.02` | convention | an effect of 2 % of the signal |
+//! | catalogue.rs | `SCALES` | `[0.3, 1.0]` | default | a short and a full form of `diagnose` |
+//! | catalogue.rs | `DEPTH_SHARE` | `0.5` | default | of `diagnose` |
+//! | catalogue.rs | `LADDER` | `1.2` | default | of `diagnose` |
+//! | catalogue.rs | `SPEEDS_MM_PER_S` | `[0.1, 0.2, 0.3, 0.5, 0.7, 1.0]` | default | of `diagnose` |
+//! | catalogue.rs | `ELEMENT_DEPTHS_MM` | `[0.2, 0.3, 0.4, 0.5, 0.6]` | default | of `element-centres` |
+//! | catalogue.rs | `SWEEP_SHARES` | `[0.3, 0.5, 0.65]` | default | of `grid-sweep` |
+//! | plan.rs | `WORTH_Z` | `2.0` | convention | two standard errors |
+//! | reach.rs | `NEARLY` | `1.05` | convention | 5 % deeper is as deep |
+//! | reach.rs | `NEARLY_AS_FAST` | `1.2` | convention | the mean speed of a load depends on its depth |
+//! | reach.rs | `SAME_MM` | `1e-6` | derived | the rounding of a number in a file |
 
 mod catalogue;
 mod experiments;

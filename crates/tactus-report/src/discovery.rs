@@ -19,7 +19,7 @@ mod words;
 
 use std::fmt;
 
-use tactus_discover::{Discovery, Verdict};
+use tactus_discover::{Closed, Discovery, Verdict};
 use tactus_model::Array;
 use tactus_schema::draft::DraftStatus;
 
@@ -37,7 +37,7 @@ pub use figures::{
 };
 pub use json::discovery_json;
 pub use next::{Proposal, not_proposed, nothing_open, open, proposals};
-pub use words::{closed, in_words};
+pub use words::{closed, definition, flags, in_words};
 
 /// A discovery and its data.
 #[derive(Debug, Clone, Copy)]
@@ -101,7 +101,7 @@ pub fn discovery_html(report: &DiscoveryReport<'_>) -> String {
         faulty::section(f, report)?;
         gap::section(f, report)?;
         tried::section(f, report.discovery)?;
-        added::section(f, report.discovery)?;
+        added::section(f, report)?;
         active::section(f, report)?;
         after::sections(f, report)?;
         basis::section(f, report)
@@ -168,21 +168,19 @@ fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
             format!("{} <small>{upper}</small>", digits(part.rms_noise, 3))
         },
     );
-    let gap_closed = found.final_.closed.map_or_else(
-        || "\u{2013}".into(),
-        |of_gap| {
-            let (share, error) = words::closed_and_error(of_gap);
-            let error = error.map_or_else(String::new, |error| format!(" <small>&#177; {error}</small>"));
-            format!("{share}{error}")
-        },
-    );
+    let share = |closed: Option<Closed>| {
+        let Some(of_gap) = closed else { return "\u{2013}".to_owned() };
+        let (share, error) = words::closed_and_error(of_gap);
+        let error = error.map_or_else(String::new, |error| format!(" <small>&#177; {error}</small>"));
+        format!("{share}{error}")
+    };
     let split = &found.split;
     for (name, figure) in [
         ("noise / counts", noise.map_or_else(|| "unknown".into(), |rms| digits(rms, 3))),
         ("residual before / counts", level(found.base.heldout_rms_counts)),
         ("residual after / counts", level(found.final_.level.heldout_rms_counts)),
         ("structured / noise, 95 % bound", structured),
-        ("gap closed", gap_closed),
+        ("gap closed", share(found.final_.closed)),
         (
             "presses fitted",
             format!(
@@ -193,6 +191,15 @@ fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
         ),
     ] {
         writeln!(f, "<div><dt>{name}</dt><dd>{figure}</dd></div>")?;
+    }
+    if let Some(Ok(one)) = &found.draft {
+        let name = Text(&one.draft.name);
+        let (with, closes) = (level(one.heldout_rms_after_counts), share(one.closed));
+        writeln!(
+            f,
+            "</dl>\n<dl class=\"figures\">\n<div><dt>with {name} / counts</dt><dd>{with}</dd></div>\n\
+             <div><dt>{name} closes, of what is left</dt><dd>{closes}</dd></div>"
+        )?;
     }
     writeln!(f, "</dl>\n</section>")
 }

@@ -1,7 +1,7 @@
 //! The draft file: an effect that no class of the library names, as data, with what speaks for it; TOML, `tactus.draft/1`.
 //!
-//! Discovery writes it. Simulators, virtual devices and calibration take the draft from a model file, which holds its [`Draft`] whole;
-//! discovery also takes those of a folder.
+//! Discovery writes it. Simulators and virtual devices take the draft from a model file, which holds its [`Draft`] whole; discovery also takes
+//! those of a folder.
 //!
 //! ```toml
 //! schema = "tactus.draft/1"
@@ -23,15 +23,20 @@
 //! range = [0.0, 0.6]
 //! ```
 //!
-//! A table has `at`, a list of places for each covariate, and `values` in place of `numbers`. Unknown keys are refused.
+//! A table has `at`, a list of places for each covariate, and `values` in place of `numbers`. Unknown keys are refused, and so is a file whose
+//! end is missing: what speaks for the draft must be there, unless it was only stated.
+
+mod line;
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, Definition, Draft, EffectError, Law, PipelineStage, When};
 
 use crate::description::{WrongField, check_kind, check_schema, wrong};
+use line::line_of;
 
 /// The schema's name in the file.
 pub const SCHEMA: &str = "tactus.draft/1";
@@ -43,7 +48,10 @@ pub struct DraftFile {
     pub draft: Draft,
     /// What became of it.
     pub status: DraftStatus,
-    /// Covariance of the law's numbers, or of a table's values; empty if it was not estimated.
+    /// What it was before a person withdrew it.
+    pub was: Option<DraftStatus>,
+    /// Covariance of the law's numbers that were fitted, or of a table's values; empty if it was not estimated. Of a straight line these are
+    /// the offset and the slope, or one of them; of a tone its sine and cosine; of other laws the scale.
     pub covariance: Vec<Vec<f64>>,
     /// Classes of the library that come nearest, the nearest first.
     pub nearest: Vec<Nearest>,
@@ -112,7 +120,7 @@ pub struct DraftEvidence {
     pub ln_odds: f64,
     /// In how many of five folds the same carrier and covariates come first.
     pub folds: u32,
-    /// Share of what was left that it closes on presses that nobody had opened when it was drafted; `None` where nothing was left there.
+    /// Share of what was left that it closes on presses that were not fitted; left out where nothing was left there.
     pub closed_share: Option<f64>,
     /// Its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -125,12 +133,11 @@ pub enum DraftFileError {
     /// The TOML is malformed; the text names line and key.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
-    /// The draft is no effect.
-    #[error("{0}")]
-    Draft(#[from] EffectError),
-    /// One field is wrong.
-    #[error("{field}: {problem}")]
+    /// One field is wrong, or missing.
+    #[error("{}{field}: {problem}", line.map_or_else(String::new, |line| format!("line {line}: ")))]
     Field {
+        /// Its line, from 1; `None` of a field that is missing.
+        line: Option<usize>,
         /// Path of the field, such as `effect.carrier`.
         field: String,
         /// What is wrong with it, and what would be right.
@@ -138,24 +145,29 @@ pub enum DraftFileError {
     },
 }
 
-impl From<WrongField> for DraftFileError {
-    fn from(WrongField { field, problem }: WrongField) -> Self {
-        Self::Field { field, problem }
-    }
-}
-
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawFile {
+    /// `"tactus.draft/1"`.
     schema: String,
+    /// What became of it.
     status: DraftStatus,
+    /// What it was before a person withdrew it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    was: Option<DraftStatus>,
+    /// The effect.
     effect: RawDraft,
+    /// Covariance of the law's fitted numbers: of a straight line its offset and slope, or one of them; of a tone its sine and cosine; of other
+    /// laws the scale; of a table its values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     covariance: Vec<Vec<f64>>,
+    /// Classes of the library that come nearest, the nearest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     nearest: Vec<Nearest>,
+    /// The data that it was drafted from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     evidence: Option<DraftEvidence>,
+    /// What a new measurement says of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     confirmation: Option<DraftConfirmation>,
 }
@@ -164,21 +176,33 @@ struct RawFile {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawDraft {
+    /// Its name: small letters, digits and hyphens, and none of the library's.
     name: String,
+    /// What it is, in one sentence.
     sentence: String,
+    /// Where in the pipeline it acts: follows from the carrier and the covariates, and must be stated so.
     stage: String,
+    /// What it adds to.
     carrier: String,
+    /// `"multiply"` of the carrier `own signal`, else `"add"`.
     combine: String,
+    /// When it acts.
     when: String,
+    /// The curve.
     law: String,
+    /// A weight for each element, if it does not act on all alike.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     weights: Option<Vec<f64>>,
+    /// Places of a table, in order: a list for each covariate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     at: Option<Vec<Vec<f64>>>,
+    /// Values of a table: of two covariates, those of the second one follow each other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     values: Option<Vec<f64>>,
+    /// The numbers of any other law, by name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     numbers: Option<BTreeMap<String, f64>>,
+    /// What the curve is a function of: one or two.
     #[serde(rename = "covariate")]
     covariates: Vec<RawCovariate>,
 }
@@ -186,8 +210,11 @@ pub(crate) struct RawDraft {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawCovariate {
+    /// Its name.
     name: String,
+    /// Its unit, which must be stated; empty of a number without one.
     unit: String,
+    /// Its least and greatest value in the data.
     range: [f64; 2],
 }
 
@@ -197,19 +224,95 @@ impl DraftFile {
     /// # Errors
     /// [`DraftFileError`] names the line and key, or the field that is wrong.
     pub fn from_toml(text: &str) -> Result<Self, DraftFileError> {
-        check_kind(SCHEMA, text)?;
+        let placed = |WrongField { field, problem }| DraftFileError::Field {
+            line: line_of(text, &field),
+            field,
+            problem,
+        };
+        check_kind(SCHEMA, text).map_err(placed)?;
         let raw: RawFile = toml::from_str(text)?;
+        Self::checked(raw).map_err(placed)
+    }
+
+    fn checked(raw: RawFile) -> Result<Self, WrongField> {
         check_schema(SCHEMA, &raw.schema)?;
         let draft = raw.effect.check("effect")?;
-        draft.check()?;
-        Ok(Self {
+        draft.check().map_err(|error| wrong(format!("effect.{}", wrong_part(&draft)), error.to_string()))?;
+        let file = Self {
             draft,
             status: raw.status,
+            was: raw.was,
             covariance: raw.covariance,
             nearest: raw.nearest,
             evidence: raw.evidence,
             confirmation: raw.confirmation,
-        })
+        };
+        file.check_numbers()?;
+        file.check_evidence()?;
+        Ok(file)
+    }
+
+    /// Checks that the lists of numbers have the right length.
+    fn check_numbers(&self) -> Result<(), WrongField> {
+        if self.draft.weights.as_ref().is_some_and(Vec::is_empty) {
+            return Err(wrong("effect.weights", "must have a number for each element"));
+        }
+        let size = self.covariance.len();
+        let fitted = fitted_numbers(&self.draft.law);
+        if size > 0 && !fitted.contains(&size) {
+            let [least, most] = [fitted.start(), fitted.end()];
+            let of = if least == most { most.to_string() } else { format!("{least} or {most}") };
+            return Err(wrong("covariance", format!("must have {of} rows for this law, not {size}")));
+        }
+        match self.covariance.iter().position(|row| row.len() != size) {
+            Some(row) => {
+                let given = self.covariance[row].len();
+                Err(wrong(format!("covariance[{row}]"), format!("must have {size} numbers, not {given}")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that what speaks for the draft is there.
+    fn check_evidence(&self) -> Result<(), WrongField> {
+        let is_stated =
+            self.covariance.is_empty() && self.nearest.is_empty() && self.status != DraftStatus::Partial;
+        match &self.evidence {
+            None if is_stated => {}
+            None => {
+                return Err(wrong(
+                    "evidence",
+                    "is missing: the file has lost its end, or it was cut by hand",
+                ));
+            }
+            Some(seen) if seen.data.is_empty() => {
+                return Err(wrong("evidence.data", "must name the data; the file may have lost its end"));
+            }
+            Some(seen) if !(0.0..=1.0).contains(&seen.p_value) => {
+                return Err(wrong(
+                    "evidence.p_value",
+                    format!("must be between 0 and 1, not {}", seen.p_value),
+                ));
+            }
+            Some(_) => {}
+        }
+        let is_measured = matches!(self.status, DraftStatus::Confirmed | DraftStatus::Refuted);
+        match &self.confirmation {
+            None if is_measured => Err(wrong(
+                "confirmation",
+                format!(
+                    "is missing: a draft is {} by a new measurement, and the file has none",
+                    self.status.name()
+                ),
+            )),
+            Some(told) if told.data.is_empty() => {
+                Err(wrong("confirmation.data", "must name the new data; the file may have lost its end"))
+            }
+            Some(told) if !told.strength.is_finite() => {
+                Err(wrong("confirmation.strength", format!("must be finite, not {}", told.strength)))
+            }
+            None | Some(_) => Ok(()),
+        }
     }
 
     /// The text of the draft file; reading it gives the same draft, to the bit.
@@ -220,6 +323,7 @@ impl DraftFile {
         toml::to_string(&RawFile {
             schema: SCHEMA.into(),
             status: self.status,
+            was: self.was,
             effect: RawDraft::of(&self.draft),
             covariance: self.covariance.clone(),
             nearest: self.nearest.clone(),
@@ -235,9 +339,26 @@ impl DraftFile {
     pub fn define(&self) -> Result<&'static Definition, EffectError> {
         self.draft.clone().define()
     }
+
+    /// Withdraws the draft: no discovery tries it.
+    pub fn retire(&mut self) {
+        if self.status != DraftStatus::Retired {
+            self.was = Some(std::mem::replace(&mut self.status, DraftStatus::Retired));
+        }
+    }
+
+    /// Takes a withdrawn draft back. A file that does not say what it was before is a draft again.
+    pub fn take_back(&mut self) {
+        if self.status == DraftStatus::Retired {
+            self.status = self.was.take().unwrap_or(DraftStatus::Drafted);
+        }
+    }
 }
 
 impl DraftStatus {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Drafted, Self::Partial, Self::Confirmed, Self::Refuted, Self::Retired];
+
     /// The word in the file.
     pub const fn name(self) -> &'static str {
         match self {
@@ -247,6 +368,24 @@ impl DraftStatus {
             Self::Refuted => "refuted",
             Self::Retired => "retired",
         }
+    }
+
+    /// What it means.
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::Drafted => "it closes most of what was left, on presses that it was not drafted from",
+            Self::Partial => "it closes a part of what was left",
+            Self::Confirmed => "a new measurement agrees with it",
+            Self::Refuted => {
+                "a new measurement does not agree with it; it is kept, and no discovery tries it"
+            }
+            Self::Retired => "a person has withdrawn it; it is kept, and no discovery tries it",
+        }
+    }
+
+    /// True if no new measurement has told yet whether it holds.
+    pub const fn is_open(self) -> bool {
+        matches!(self, Self::Drafted | Self::Partial)
     }
 
     /// True if discovery takes it among the effects of the library.
@@ -334,6 +473,46 @@ impl RawDraft {
         agree(field, "stage", &self.stage, stage_name(draft.stage()))?;
         agree(field, "combine", &self.combine, combine(carrier))?;
         Ok(draft)
+    }
+}
+
+/// How many numbers of a law are fitted, and so have a covariance. The shape of a law, such as an exponent or a length, is chosen.
+fn fitted_numbers(law: &Law) -> RangeInclusive<usize> {
+    match law {
+        Law::Linear { .. } => 1..=2,
+        Law::Periodic { .. } => 2..=2,
+        Law::Table { values, .. } => values.len()..=values.len(),
+        Law::Power { .. }
+        | Law::Exponential { .. }
+        | Law::Saturating { .. }
+        | Law::Threshold { .. }
+        | Law::Logarithm { .. } => 1..=1,
+    }
+}
+
+/// The key of a draft that is no effect, in its table: the one without which it would be an effect.
+fn wrong_part(draft: &Draft) -> String {
+    let is_mended = |mended: Draft| mended.check().is_ok();
+    if is_mended(Draft { name: "draft".into(), ..draft.clone() }) {
+        return "name".into();
+    }
+    if is_mended(Draft { weights: None, ..draft.clone() }) {
+        return "weights".into();
+    }
+    for index in 0..draft.ranges.len() {
+        let mut ranges = draft.ranges.clone();
+        ranges[index] = [0.0, 1.0];
+        if is_mended(Draft { ranges, ..draft.clone() }) {
+            return format!("covariate[{index}].range");
+        }
+    }
+    let numbers = draft.law.numbers();
+    let wrong =
+        numbers.iter().find(|(name, value)| !value.is_finite() || (*name == "length" && *value <= 0.0));
+    match (&draft.law, wrong) {
+        (_, Some((name, _))) => format!("numbers.{name}"),
+        (Law::Table { .. }, None) => "values".into(),
+        (_, None) => "covariate".into(),
     }
 }
 

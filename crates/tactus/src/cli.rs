@@ -176,7 +176,7 @@ pub(crate) enum EffectsCommand {
         #[arg(long, value_name = "FILE")]
         figure: Option<PathBuf>,
     },
-    /// Put a draft into the library under its name: every discovery tries it from then on.
+    /// Put a draft into the library under its name: every discovery tries it from then on, unless it is refuted.
     Add {
         /// The draft that a discovery wrote, such as discovery/draft-1.toml.
         file: PathBuf,
@@ -188,8 +188,27 @@ pub(crate) enum EffectsCommand {
         /// The new name: small letters, digits and hyphens.
         to: String,
     },
+    /// Measure a draft anew: compare it with recordings that it was not drafted from, and write into its file whether it holds.
+    Confirm {
+        /// Its name.
+        name: String,
+        /// New recordings and measurement tables of one rig; presses to several depths and places, as `diagnose` makes them.
+        #[arg(required = true, value_name = "RECORDING|TABLE")]
+        recordings: Vec<PathBuf>,
+        /// The model with what else the rig has, instead of the rig file's, such as the model.toml of a discovery.
+        #[arg(long, value_name = "FILE")]
+        model: Option<PathBuf>,
+        /// Seed of the split into fitted and held-out presses.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
     /// Withdraw a draft: its file stays, and no discovery tries it.
     Retire {
+        /// Its name.
+        name: String,
+    },
+    /// Take a withdrawn draft back: it is again what it was before.
+    Use {
         /// Its name.
         name: String,
     },

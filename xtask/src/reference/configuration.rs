@@ -8,18 +8,19 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 use syn::{Fields, Type};
 
+use super::drafts;
 use super::source::{doc, enumeration, has_default, key, read, structure};
 
 /// A table of a file: its heading, the source of its type and the type's name.
-struct Table {
-    heading: &'static str,
+pub(super) struct Table {
+    pub(super) heading: &'static str,
     source: &'static str,
     of: &'static str,
     /// Source and name of the checked type, which documents keys that the type itself does not.
     checked: Option<(&'static str, &'static str)>,
 }
 
-const fn table(heading: &'static str, source: &'static str, of: &'static str) -> Table {
+pub(super) const fn table(heading: &'static str, source: &'static str, of: &'static str) -> Table {
     Table { heading, source, of, checked: None }
 }
 
@@ -105,6 +106,7 @@ pub(super) fn page(top: &Path) -> Result<String> {
         &OF_MODEL,
         "config/models/digitacts.toml",
     )?;
+    page.push_str(&drafts::section(top)?);
     let frames = doc(&read(top, "crates/tactus-wire/src/declared.rs")?.attrs);
     let start = frames.find("```toml").context("declared.rs explains the keys")?;
     let end = frames[start + 3..].find("```").context("the example ends")? + start + 6;
@@ -139,7 +141,7 @@ fn section(
 }
 
 /// The keys of a type.
-fn rows(top: &Path, table: &Table) -> Result<String> {
+pub(super) fn rows(top: &Path, table: &Table) -> Result<String> {
     let file = read(top, table.source)?;
     let mut out = String::new();
     if let Ok(found) = structure(&file, table.of) {

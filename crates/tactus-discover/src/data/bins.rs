@@ -3,9 +3,9 @@
 //! A frame in motion is a bin of its own. Once the tip rests, each bin holds more frames than the one before, up to half a
 //! second, so bins are short where relaxation is fast.
 
-use tactus_model::{Trajectory, TrajectoryError};
+use tactus_model::Trajectory;
 
-use super::error::DiscoverError;
+use super::error::{DiscoverError, Mismatch};
 use super::frames::Frames;
 use super::motion::{CLEAR_MM, interval_s, pressing, turns, unchanged};
 use super::noise::Noise;
@@ -288,6 +288,5 @@ fn path(frames: &Frames, begin: usize, end: usize) -> Result<Trajectory, Discove
         last_s = last_s.max(one.t_s);
         rises.then_some((one.t_s, one.position_mm))
     });
-    Trajectory::new(points)
-        .map_err(|problem: TrajectoryError| DiscoverError::TooLittle(format!("the stage's path: {problem}")))
+    Ok(Trajectory::new(points).map_err(Mismatch::Path)?)
 }

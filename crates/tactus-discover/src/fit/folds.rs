@@ -28,9 +28,9 @@ use crate::data::DiscoverError;
 use crate::numbers::{NORMAL_PER_MEDIAN, median};
 
 /// Number of folds. The fit of each has four fifths of the presses or elements.
-const FOLDS: usize = 5;
-/// Greatest part of a block, in standard deviations.
-const CLIP: f64 = 4.0;
+pub(crate) const FOLDS: usize = 5;
+/// Greatest part of a block, in standard deviations; in sums under flipped signs, too.
+pub(crate) const CLIP: f64 = 4.0;
 
 /// What folds are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

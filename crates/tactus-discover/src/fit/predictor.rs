@@ -9,7 +9,7 @@ use tactus_model::{
 };
 
 use super::parameters::{Parameters, Term};
-use crate::data::{Bins, DiscoverError, Frames, Known};
+use crate::data::{Bins, DiscoverError, Frames, Known, Mismatch};
 
 /// The data and what is known of the rig, from which predictions are made.
 #[derive(Debug, Clone)]
@@ -141,8 +141,9 @@ impl<'a> Predictor<'a> {
 
     fn indenter(&self, tool: u16) -> Result<Indenter, DiscoverError> {
         let id = &self.frames.indenters[usize::from(tool)];
-        let unknown = || DiscoverError::TooLittle(format!("the rig describes no indenter {id:?}"));
-        self.known.indenters.get(id).cloned().ok_or_else(unknown)
+        let known = &self.known.indenters;
+        let unknown = || Mismatch::UnknownIndenter { id: id.clone(), known: known.keys().cloned().collect() };
+        Ok(known.get(id).cloned().ok_or_else(unknown)?)
     }
 }
 

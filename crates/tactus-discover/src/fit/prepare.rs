@@ -8,8 +8,8 @@ use super::parameters::{Parameters, Term};
 use super::predictor::{Predictor, no_images};
 use super::problem::{Fitted, Problem};
 use crate::data::{
-    Bins, Converter, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Line, Noise, Rounding, spectrum,
-    still,
+    Bins, Converter, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Line, Noise, Rounding, TooLittle,
+    spectrum, still,
 };
 
 /// Least number of fitted presses.
@@ -62,10 +62,7 @@ impl<'a> Prepared<'a> {
     ) -> Result<Self, DiscoverError> {
         let heldout = HeldOut::choose(frames, seed);
         if heldout.train_presses < PRESSES_LEAST {
-            return Err(DiscoverError::TooLittle(format!(
-                "{} presses can be fitted; at least {PRESSES_LEAST} are needed, and half as many to hold out",
-                heldout.train_presses
-            )));
+            return Err(TooLittle::FewPresses { fitted: heldout.train_presses, least: PRESSES_LEAST }.into());
         }
         let still = still(frames);
         let declared_counts = known.array.step_counts();

@@ -27,7 +27,7 @@ use super::parameters::{Parameters, Term};
 use super::predictor::Predictor;
 use super::scale::Scale;
 use super::sums::Direction;
-use crate::data::{Contacts, DiscoverError, Noise};
+use crate::data::{Contacts, DiscoverError, Noise, QUIETEST};
 use crate::numbers::parallel;
 
 /// A fit ends when the expected reduction of the cost by a step is less than this.
@@ -149,9 +149,9 @@ impl<'a> Problem<'a> {
         let slow_and_clear = slow.iter().enumerate().map(clear).collect();
         let sum = |weights: &[f64]| weights.iter().sum::<f64>();
         let variance = (sum(&train) / sum(&slow).max(f64::MIN_POSITIVE)).max(1.0);
-        // A single element that is quieter than most cannot be distinguished from rounding.
+        let least_counts = QUIETEST * noise.rms_counts;
         let element_weight =
-            noise.by_element_counts.iter().map(|rms| rms.max(0.7 * noise.rms_counts).powi(-2)).collect();
+            noise.by_element_counts.iter().map(|rms| rms.max(least_counts).powi(-2)).collect();
         let presses = |bin: &usize| train[*bin] > 0.0 && frames.position_mm[bins.first[*bin]][2] < 0.0;
         let mut gained_runs: Vec<usize> = (0..bins.len()).filter(presses).map(|bin| bins.run[bin]).collect();
         gained_runs.dedup();

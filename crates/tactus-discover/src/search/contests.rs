@@ -27,7 +27,7 @@ use crate::data::DiscoverError;
 use crate::progress::Stage;
 
 /// A rival acts like a class if it would take over more than this share.
-const TAKEN_SHARE: f64 = 0.3;
+pub const TAKEN_SHARE: f64 = 0.3;
 /// A class is only the nearest form if such a rival explains more than this share beside it: the geometric mean of 0.144 and 0.20.
 const BESIDE_SHARE: f64 = 0.17;
 

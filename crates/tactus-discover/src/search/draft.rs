@@ -29,7 +29,7 @@ use super::evidence::{Addition, Evidence, Gain, Signs, excused};
 use super::grow::{ALPHA, FLIPS, POLISH_ROUNDS, Search};
 use super::score::{Score, flipped, largest, p_value};
 use crate::data::DiscoverError;
-use crate::fit::{Fitted, Free, Grams, Term};
+use crate::fit::{FOLDS, Fitted, Free, Grams, Term};
 use crate::numbers::parallel;
 use crate::progress::Stage;
 
@@ -44,8 +44,6 @@ const KNOTS: usize = 7;
 const KNOTS_OF_SECOND: usize = 4;
 /// By distance of what acts on every element, near or far: the range is wide.
 const KNOTS_OF_DISTANCE: usize = 12;
-/// Folds of blocks in which the same atom should come first.
-const FOLDS: usize = 5;
 /// Logarithm of the odds by which a draft must be ahead of every class.
 const AHEAD_LN_ODDS: f64 = 5.0;
 /// Least part of a draft that recalibration and the model do not take up.

@@ -24,8 +24,9 @@ const HARDLY_ANYTHING: f64 = 0.25;
 const OTHERS_MAX: usize = 4;
 /// A class must gain so many standard errors, from the scatter of blocks.
 const BLOCKS_Z: f64 = 2.0;
-/// Probability of a reported set of classes, and by how many units one at its end is behind the best.
-const SET_PROBABILITY: f64 = 0.95;
+/// Probability of a reported set of classes.
+pub const SET_PROBABILITY: f64 = 0.95;
+/// By how many units a class at the end of such a set is behind the best.
 const SET_UNITS: f64 = 3.0;
 
 impl Search<'_> {

@@ -1,6 +1,7 @@
 use std::cell::Cell;
 
 use super::*;
+use crate::data::TooLittle;
 use crate::fixtures;
 
 #[test]
@@ -30,7 +31,7 @@ fn the_oldest_is_forgotten_and_a_failure_is_not_kept() {
         model
     };
     let kept = Kept::default();
-    let failed = kept.at(&model(0), || Err(DiscoverError::TooLittle("for a test".into())));
+    let failed = kept.at(&model(0), || Err(TooLittle::FewPresses { fitted: 0, least: 1 }.into()));
     assert!(failed.is_err());
     for nth in 0..=MODELS_MAX {
         assert_eq!(kept.at(&model(nth), || Ok(nth)).unwrap(), nth);

@@ -17,7 +17,8 @@ pub struct Options {
 /// The rule by which effects are added.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Rule {
-    /// Corrected tests, held-out presses, and a comparison of each added effect with others in its place.
+    /// Evidence of sets of effects, corrected tests, a comparison of each added effect with rivals and other effects in its place, and folds of
+    /// the fitted presses that confirm it. Held-out presses have no say until the verdict.
     #[default]
     Protocol,
     /// Forward selection by the Bayesian information criterion of the fitted presses alone, as a comparison for the protocol.

@@ -2,7 +2,7 @@
 //!
 //! Each is a group of columns with free coefficients: a smooth function (straight lines between knots) of a covariate, or of two, times
 //! the signal or its slope; or a tone in a covariate, whose frequency is the clearest of a periodogram ([`super::tones`]) and charged for
-//! this. None is modelled after a known physics.
+//! this.
 //!
 //! | rival | function of | times |
 //! |---|---|---|
@@ -21,6 +21,17 @@
 //! | tone in counts | the element's own counts | 1 |
 //! | tone in travel | the length of the tip's way | 1 |
 //! | tone in x, in y | the tip's place | the element's own signal |
+//!
+//! None of them has the formula of a physics. But some are here because tuning sets with a certain physics outside the library had a wrong name
+//! without them, so what discovery says of that physics is no independent evidence:
+//!
+//! | rival | added | after a miss of |
+//! |---|---|---|
+//! | jump in counts | 2026-11-28 | `range-switch`: an amplifier whose ranges do not meet was named `hardening` |
+//! | place, in counts | 2026-11-29 | `arm-shadow`: what the arm over the sensor adds to counts |
+//!
+//! Tones and distances were added on 2026-11-24, with the list of rivals of issue 19. The height above the surface was added on the same day. It is
+//! not in that list, and the history does not tell whether a miss of `proximity` led to it.
 //!
 //! Beside them stand the effects that the model has, each with a strength that varies ([`super::varying`]).
 //!

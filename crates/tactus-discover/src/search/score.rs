@@ -27,13 +27,11 @@
 
 use nalgebra::DMatrix;
 
-use crate::fit::Grams;
+use crate::fit::{CLIP, Grams};
 use crate::numbers::{Rng, median, of_picked, parallel};
 
 /// Median of the squared standard normal distribution.
 const MEDIAN_SQUARE: f64 = 0.454_936;
-/// Greatest part of one block in a flipped sum, in standard deviations.
-const CLIP: f64 = 4.0;
 /// Least number of blocks from which the excess scatter is estimated, and the excess assumed for fewer.
 const BLOCKS_LEAST: usize = 8;
 const EXCESS_OF_FEW: f64 = 1.5;

@@ -43,7 +43,9 @@ pub(crate) struct Step {
 
 impl Step {
     fn is_confirmed(&self) -> bool {
-        self.added.folds_p_value <= CONFIRMED_P.max(AGREED * self.least_p)
+        let p_value = self.added.folds_p_value;
+        // What folds cannot tell is confirmed by its odds alone.
+        p_value.is_nan() || p_value <= CONFIRMED_P.max(AGREED * self.least_p)
     }
 }
 
@@ -107,7 +109,7 @@ impl Confirmed {
         (!self.agreed.is_empty()).then(|| {
             format!(
                 "the presses are few: all their independent blocks agree with {names}, but they are too few for \
-                 a probability of {CONFIRMED_P}"
+                 a probability of {CONFIRMED_P}; five presses or more, at several places, would tell"
             )
         })
     }
@@ -179,8 +181,9 @@ impl Search<'_> {
                 terms: terms.filter(|(term, _)| term.definition.name == name).map(estimated).collect(),
                 p_value,
                 q_value: p_value,
-                // Those of a random walk cannot be told: its odds alone speak for it.
-                folds_p_value: by_folds.map_or(0.0, |gains| sign_flip_p(&gains, FLIPS, self.options.seed)),
+                // Beside a random walk it is not tested, and so no number: a report has none.
+                folds_p_value: by_folds
+                    .map_or(f64::NAN, |gains| sign_flip_p(&gains, FLIPS, self.options.seed)),
                 heldout_rms_before_counts: problem.heldout_rms_counts(&before.predicted),
                 heldout_rms_after_counts: problem.heldout_rms_counts(&grown.predicted),
                 curves,

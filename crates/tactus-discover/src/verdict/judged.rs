@@ -23,7 +23,7 @@ use crate::search::{
 const LITTLE_NOISE: f64 = 0.5;
 
 /// An effect closes so much of the gap that its own physics makes, whatever its form. A name that closes less at most is only the nearest.
-const NEAR_CLOSES: f64 = 0.85;
+pub const NEAR_CLOSES: f64 = 0.85;
 
 /// Effects that go where they like between two presses.
 const DRIFTS: [&str; 2] = ["baseline-drift", "gain-drift"];

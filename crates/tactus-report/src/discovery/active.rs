@@ -35,7 +35,7 @@ pub struct ActiveRun {
 pub struct AmbiguousEffect {
     /// The effect that was added.
     pub effect: &'static str,
-    /// Effects that predict the held-out presses as well.
+    /// Effects that explain the fitted presses nearly as well.
     pub equivalent: Vec<&'static str>,
 }
 

@@ -5,27 +5,25 @@ use std::fmt;
 use tactus_discover::{AddedEffect, Discovery, Estimated, FittedCurve, Inclusion};
 use tactus_model::{Effect, effect::Definition};
 
-use super::free_curve;
-use super::words::{self, list};
+use super::words::{self, either, list};
+use super::{DiscoveryReport, draft, free_curve};
 use crate::{
     document::{Column, Table},
     markup::Text,
     numbers::{digits, short, with_error},
 };
 
-/// A parameter nearer to the end of its range than this share of it is at its end.
-const BOUND_SHARE: f64 = 1e-3;
 /// A probability worth a line of its own.
 const SAID_LEAST: f64 = 0.1;
 
-pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
+pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Result {
+    let found = report.discovery;
     writeln!(f, "<section>\n<h2>What was added</h2>")?;
     if found.steps.is_empty() {
         writeln!(f, "<p>Nothing.</p>")?;
     }
     for step in &found.steps {
-        let own = found.effects.iter().find(|effect| effect.name() == step.effect).map(Effect::definition);
-        self::step(f, step, own)?;
+        self::step(f, step, report)?;
     }
     let mut known: Vec<&str> = found.effects.iter().map(Effect::name).collect();
     known.retain(|name| found.steps.iter().all(|step| step.effect != *name));
@@ -58,7 +56,7 @@ fn inclusions(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     if !other.is_empty() {
         writeln!(
             f,
-            "<p>Of the other {} effects that these data can show, each has at most {}; before the data it was 5 %.</p>",
+            "<p>Of the other {} effects that these data can show, each has at most {}; before the data each effect had a probability of 5 %.</p>",
             other.len(),
             words::percent(most)
         )?;
@@ -66,13 +64,64 @@ fn inclusions(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     Ok(())
 }
 
-fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect, own: Option<&Definition>) -> fmt::Result {
-    // A draft is in no registry, and a random walk is no effect of the model.
-    let definition = own.or_else(|| Definition::find(step.effect).ok());
+fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect, report: &DiscoveryReport<'_>) -> fmt::Result {
+    let definition = words::definition(report.discovery, step);
     let summary = definition.map_or("", |definition| definition.summary);
     writeln!(f, "<h3>{}</h3>\n<p>{}.</p>", Text(step.effect), Text(capital(summary)))?;
+    parameters(f, step, definition)?;
+    for flag in words::flags(report.discovery, step) {
+        writeln!(f, "<p class=\"warn\">{}</p>", Text(flag))?;
+    }
+    step.curves.iter().try_for_each(|curve| self::curve(f, step.effect, curve))?;
+    if let Some(draft) = definition.and_then(Definition::draft) {
+        draft::figures(f, report.array, draft, &[])?;
+        let mut table = Table::new(&[Column::Name("what"), Column::Name("value")]);
+        for (what, value) in draft::facts(draft, &report.discovery.grown) {
+            table.row([what.to_owned(), value]);
+        }
+        writeln!(f, "{table}")?;
+    }
+    writeln!(
+        f,
+        "<p>On held-out presses the residual is {} counts rms without it (all else fitted again) and {} with it. The probability of such a \
+         gain by noise alone is {} (false-discovery rate {} over all added effects). {}</p>",
+        digits(step.heldout_rms_before_counts, 3),
+        digits(step.heldout_rms_after_counts, 3),
+        words::probability(step.p_value),
+        words::probability(step.q_value),
+        by_folds(step.folds_p_value)
+    )?;
+    if step.equivalent.is_empty() {
+        return writeln!(f, "<p>The data distinguish it from every other effect that they can show.</p>");
+    }
+    let which = if step.equivalent.len() == 1 { "which explains" } else { "each of which explains" };
+    writeln!(
+        f,
+        "<p class=\"warn\">These data cannot distinguish it from {}, {which} the fitted presses nearly as well. Any of them may be the cause; \
+         the model contains this one as one possible description.</p>",
+        Text(either(&step.equivalent))
+    )
+}
+
+/// What fitted presses say that the fit has not seen.
+fn by_folds(p_value: f64) -> String {
+    if p_value.is_nan() {
+        return "On fitted presses it is not tested: beside a random walk none is predicted by a fit to others. Its odds alone confirm it."
+            .into();
+    }
+    format!(
+        "On fitted presses, each predicted by a fit to others, it is {}: this decides whether the effect is confirmed.",
+        words::probability(p_value)
+    )
+}
+
+/// The parameters of each term with their possible ranges.
+fn parameters(
+    f: &mut fmt::Formatter<'_>,
+    step: &AddedEffect,
+    definition: Option<&Definition>,
+) -> fmt::Result {
     let mut nth = 0;
-    let mut flags: Vec<String> = Vec::new();
     // Terms of one effect may have different parameters.
     for terms in step.terms.chunk_by(|one, other| names(one).eq(names(other))) {
         let parameters = terms.first().map_or(&[][..], Vec::as_slice);
@@ -88,37 +137,12 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect, own: Option<&Definition>
             table.row([name].into_iter().chain(term.iter().map(value)));
         }
         if let Some(definition) = definition {
-            flags.extend(terms.iter().flatten().filter_map(|found| flag(definition, found)));
             let range = |found: &Estimated| range(definition, found);
             table.row(["possible range".to_owned()].into_iter().chain(parameters.iter().map(range)));
         }
         writeln!(f, "{table}")?;
     }
-    for flag in flags {
-        writeln!(f, "<p class=\"warn\">{}</p>", Text(flag))?;
-    }
-    step.curves.iter().try_for_each(|curve| self::curve(f, step.effect, curve))?;
-    writeln!(
-        f,
-        "<p>On held-out presses the residual is {} counts rms without it (all else fitted again) and {} with it. The probability of such a \
-         gain by noise alone is {} (false-discovery rate {} over all added effects). On fitted presses, each predicted by a fit to others, it is \
-         {}: this decides whether the effect is confirmed.</p>",
-        digits(step.heldout_rms_before_counts, 3),
-        digits(step.heldout_rms_after_counts, 3),
-        words::probability(step.p_value),
-        words::probability(step.q_value),
-        words::probability(step.folds_p_value)
-    )?;
-    if step.equivalent.is_empty() {
-        writeln!(f, "<p>The data distinguish it from every other effect that they can show.</p>")
-    } else {
-        writeln!(
-            f,
-            "<p class=\"warn\">These data cannot distinguish it from {}, which predicts the held-out presses equally well. Either may be the cause; \
-             the model contains this one as one possible description.</p>",
-            Text(either(&step.equivalent))
-        )
-    }
+    Ok(())
 }
 
 /// A free curve in place of a formula, or a parameter's table, in a table and a figure.
@@ -173,35 +197,6 @@ fn range(definition: &Definition, found: &Estimated) -> String {
     match parameter.filter(|_| found.standard_error.is_some()) {
         Some(parameter) => parameter.range.map(|end| short(end, 6)).join(" to "),
         None => String::new(),
-    }
-}
-
-/// A warning of a parameter at the end of its range, or one that the data hardly determine.
-fn flag(definition: &Definition, found: &Estimated) -> Option<String> {
-    let known = definition.parameters.iter().find(|known| known.name == found.name)?;
-    let error = found.standard_error?;
-    let Estimated { name, value, .. } = found;
-    let slack = BOUND_SHARE * (known.range[1] - known.range[0]);
-    if let Some(end) = known.range.into_iter().find(|end| (value - end).abs() <= slack) {
-        // Many parameters do nothing at the end of their range, and may be there.
-        let is_neutral = (end - known.neutral).abs() <= slack;
-        let what = if is_neutral {
-            "does nothing"
-        } else {
-            "is at the end of its range: the true value may lie beyond"
-        };
-        return Some(format!("{name} {what}."));
-    }
-    (value.abs() < error).then(|| {
-        format!("{name} has a standard error greater than its value: these data hardly determine it.")
-    })
-}
-
-/// `a`, `a or b`, `a, b or c`.
-fn either(names: &[&str]) -> String {
-    match names {
-        [most @ .., last] if !most.is_empty() => format!("{} or {last}", most.join(", ")),
-        names => names.concat(),
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::fmt;
 
-use tactus_discover::{DraftedEffect, NoDraft};
-use tactus_model::effect::Law;
+use tactus_discover::{BaseModel, DraftedEffect, NoDraft};
+use tactus_model::effect::{Draft, Law};
+use tactus_model::{Array, Covariate};
 use tactus_schema::draft::{DraftStatus, stage_name};
 
 use super::{
@@ -45,8 +46,41 @@ fn drafted(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>, one: &Draft
         Text(&draft.sentence),
         Text(&draft.name),
     )?;
-    if let Some(curve) = draft_curve(draft, &one.knots) {
-        let caption = match (&draft.law, one.knots.is_empty()) {
+    figures(f, report.array, draft, &one.knots)?;
+    let mut table = Table::new(&[Column::Name("what"), Column::Name("value")]);
+    let nearest = one.nearest.iter().enumerate().map(|(nth, (name, behind))| {
+        let of = if nth == 0 { " in the logarithm of the odds" } else { "" };
+        format!("{name} (behind by {}{of})", digits(*behind, 3))
+    });
+    let nearest: Vec<String> = nearest.collect();
+    let noise = report.discovery.floor.rms_counts();
+    let level = |counts: f64| words::level(counts, noise);
+    let alike = if one.alike.is_empty() { "none".to_owned() } else { one.alike.join("; ") };
+    let evidence = [
+        ("probability by noise alone", words::probability(one.p_value)),
+        ("logarithm of its odds", digits(one.ln_odds, 3)),
+        ("nearest classes", nearest.join(", ")),
+        ("drafts that these data cannot tell from it", alike),
+        ("folds in which it comes first or as good", format!("{} of 5", one.folds)),
+        ("held-out residual without it", level(one.heldout_rms_before_counts)),
+        ("held-out residual with it", level(one.heldout_rms_after_counts)),
+        ("closes of what was left", one.closed.map_or_else(|| "unknown".into(), words::closed)),
+    ];
+    for (what, value) in facts(draft, &one.base).into_iter().chain(evidence) {
+        table.row([what.to_owned(), value]);
+    }
+    writeln!(f, "{table}\n</section>")
+}
+
+/// The curve of a draft, with its knots if they are known, and its weights.
+pub(super) fn figures(
+    f: &mut fmt::Formatter<'_>,
+    array: &Array,
+    draft: &Draft,
+    knots: &[[f64; 3]],
+) -> fmt::Result {
+    if let Some(curve) = draft_curve(draft, knots) {
+        let caption = match (&draft.law, knots.is_empty()) {
             (Law::Table { .. }, false) => "fitted knots with standard errors",
             (_, false) => "fitted knots with standard errors, and the law that passes through them",
             (Law::Table { .. }, true) => {
@@ -59,24 +93,17 @@ fn drafted(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>, one: &Draft
             "<figure>\n{curve}\n<figcaption>The draft\u{2019}s curve: {caption}.</figcaption>\n</figure>"
         )?;
     }
-    if let Some(weights) = draft_weights(report.array, draft) {
+    if let Some(weights) = draft_weights(array, draft) {
         writeln!(f, "<figure>\n{weights}\n<figcaption>Its weight for each element.</figcaption>\n</figure>")?;
     }
-    let mut table = Table::new(&[Column::Name("what"), Column::Name("value")]);
-    let covariates: Vec<String> = draft
-        .covariates
-        .iter()
-        .zip(&draft.ranges)
-        .map(|(covariate, [least, most])| {
-            format!(
-                "{}, {} to {} {}",
-                covariate.name(),
-                digits(*least, 3),
-                digits(*most, 3),
-                covariate.unit()
-            )
-        })
-        .collect();
+    Ok(())
+}
+
+/// What a draft acts on and by what.
+pub(super) fn facts(draft: &Draft, base: &BaseModel) -> Vec<(&'static str, String)> {
+    let covariates = draft.covariates.iter().zip(&draft.ranges);
+    let covariates: Vec<String> =
+        covariates.map(|(covariate, range)| covariate_range(*covariate, *range, base)).collect();
     let numbers: Vec<String> =
         draft.law.numbers().into_iter().map(|(name, value)| format!("{name} {}", digits(value, 3))).collect();
     let law = if numbers.is_empty() {
@@ -84,27 +111,24 @@ fn drafted(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>, one: &Draft
     } else {
         format!("{}: {}", draft.law.name(), numbers.join(", "))
     };
-    let nearest: Vec<String> =
-        one.nearest.iter().map(|(name, behind)| format!("{name} ({} behind)", digits(*behind, 3))).collect();
-    let noise = report.discovery.floor.rms_counts();
-    let level = |counts: f64| words::level(counts, noise);
-    let alike = if one.alike.is_empty() { "none".to_owned() } else { one.alike.join("; ") };
-    for (what, value) in [
+    vec![
         ("stage", stage_name(draft.stage()).to_owned()),
         ("carrier", format!("{} ({})", draft.carrier.name(), draft.carrier.unit())),
         ("acts", draft.when.name().to_owned()),
         ("depends on", covariates.join("; ")),
         ("law", law),
-        ("probability by noise alone", words::probability(one.p_value)),
-        ("logarithm of its odds", digits(one.ln_odds, 3)),
-        ("nearest classes, by the same", nearest.join(", ")),
-        ("drafts that these data cannot tell from it", alike),
-        ("folds in which it comes first or as good", format!("{} of 5", one.folds)),
-        ("held-out residual without it", level(one.heldout_rms_before_counts)),
-        ("held-out residual with it", level(one.heldout_rms_after_counts)),
-        ("closes of what was left", one.closed.map_or_else(|| "unknown".into(), words::closed)),
-    ] {
-        table.row([what.to_owned(), value]);
+    ]
+}
+
+/// Such as `depth, 0.10 to 0.61 mm`. A draft sees signals in mm, before the sensitivity; the gap's table has them in counts.
+fn covariate_range(covariate: Covariate, range: [f64; 2], base: &BaseModel) -> String {
+    let [least, most] = words::ends(range);
+    let told = format!("{}, {least} to {most} {}", covariate.name(), covariate.unit());
+    if !(covariate.needs_signals() && covariate.unit() == "mm") {
+        return told;
     }
-    writeln!(f, "{table}\n</section>")
+    let of_elements = &base.response.sensitivity_counts_per_mm;
+    let sensitivity = of_elements.iter().sum::<f64>() / of_elements.len() as f64;
+    let [least, most] = words::ends(range.map(|end| sensitivity * end));
+    format!("{told} (times the mean sensitivity: {least} to {most} counts)")
 }

@@ -100,7 +100,7 @@ fn table(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
 pub(super) fn table_of(gap: &[Gap]) -> Table<'static> {
     let mut table = Table::new(&COLUMNS);
     for gap in gap {
-        let [from, to] = gap.range.map(|end| digits(end, 3));
+        let [from, to] = words::ends(gap.range);
         let size = digits(gap.effect_size, 3);
         table.row([gap.covariate, &from, &to, gap.unit, &size, &probability(gap.q_value)]);
     }

@@ -15,6 +15,7 @@ use tactus_model::effect::{Draft, Law};
 use tactus_schema::draft::stage_name;
 
 use super::draft::status;
+use super::words::{because, flags};
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, LabEffect, in_words};
 
 /// Name of the form of `report.json`.
@@ -224,6 +225,7 @@ struct StepJson<'a> {
     terms: Vec<BTreeMap<&'a str, EstimateJson>>,
     p_value: f64,
     q_value: f64,
+    /// Null if it was not tested.
     folds_p_value: f64,
     heldout_rms_before: f64,
     heldout_rms_after: f64,
@@ -231,6 +233,8 @@ struct StepJson<'a> {
     form: &'static str,
     knots: Option<KnotsJson<'a>>,
     tables: Vec<TableJson<'a>>,
+    /// Parameters at the end of their range or hardly determined, a sentence each.
+    flags: Vec<String>,
     equivalent: &'a [&'static str],
 }
 
@@ -424,8 +428,8 @@ impl<'a> ReportJson<'a> {
             rounds: found.rounds.iter().map(RoundJson::of).collect(),
             given_up: found.given_up.iter().map(GivenUpJson::of).collect(),
             staircase: found.staircase.iter().map(StairJson::of).collect(),
-            steps: found.steps.iter().map(StepJson::of).collect(),
-            tentative: found.tentative.iter().map(StepJson::of).collect(),
+            steps: found.steps.iter().map(|step| StepJson::of(found, step)).collect(),
+            tentative: found.tentative.iter().map(|step| StepJson::of(found, step)).collect(),
             inclusions: found.inclusions.iter().map(InclusionJson::of).collect(),
             contests: found.contests.iter().map(ContestJson::of).collect(),
             grown: GrownJson {
@@ -609,7 +613,7 @@ impl<'a> RoundJson<'a> {
 
 impl<'a> GivenUpJson<'a> {
     fn of(one: &'a GivenUp) -> Self {
-        Self { effect: one.effect, because: one.in_words() }
+        Self { effect: one.effect, because: because(one) }
     }
 }
 
@@ -662,7 +666,7 @@ impl<'a> ContestJson<'a> {
 }
 
 impl<'a> StepJson<'a> {
-    fn of(step: &'a AddedEffect) -> Self {
+    fn of(found: &Discovery, step: &'a AddedEffect) -> Self {
         let numbered = step.terms.iter().enumerate().flat_map(|(nth, term)| {
             let suffix = if nth == 0 { String::new() } else { format!("#{}", nth + 1) };
             term.iter().map(move |one| (format!("{}{suffix}", one.name), EstimateJson::of(one)))
@@ -688,6 +692,7 @@ impl<'a> StepJson<'a> {
             },
             knots,
             tables,
+            flags: flags(found, step),
             equivalent: &step.equivalent,
         }
     }

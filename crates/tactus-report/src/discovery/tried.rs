@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use tactus_discover::{Discovery, Round, TriedEffect};
+use tactus_discover::{Because, Discovery, Round, TriedEffect};
 
-use super::words::{list, percent, would_close};
+use super::words::{WouldClose, because, list, percent};
 use crate::{
     document::{Column, Table},
     markup::Text,
@@ -22,10 +22,10 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
         f,
         "<p class=\"lead\">In each round every effect that the data can show is scored on the fitted presses: would a small amount of it \
          reduce the residual? The best are then fitted jointly with the base model and the effects added before, and the one with the \
-         greatest odds on the fitted presses is taken. The figures of held-out presses are for the reader; they choose nothing.</p>"
+         greatest odds on the fitted presses is taken. The last figures are of held-out presses and of the whole model with the effect; they are for the reader, and choose nothing.</p>"
     )?;
-    for (nth, round) in found.rounds.iter().enumerate() {
-        self::round(f, nth + 1, round, found)?;
+    for nth in 0..found.rounds.len() {
+        round(f, nth, found)?;
     }
     given_up(f, found)?;
     writeln!(f, "</section>")
@@ -38,40 +38,71 @@ fn given_up(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     }
     writeln!(f, "<h3>Given up</h3>\n<ul>")?;
     for one in &found.given_up {
-        let closes = would_close(found, one).map_or_else(String::new, |share| {
-            format!(", though it would close {} of the gap", percent(share))
-        });
-        writeln!(f, "<li>{}{closes}: {}.</li>", Text(one.effect), Text(one.in_words()))?;
+        let closes = WouldClose::of(found, one.effect);
+        let closes = closes.map_or_else(String::new, |closes| format!(" ({})", closes.in_words()));
+        writeln!(f, "<li>{}: {}{}.</li>", Text(one.effect), Text(because(one)), Text(closes))?;
     }
     writeln!(f, "</ul>")
 }
 
-fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round, found: &Discovery) -> fmt::Result {
+/// What a round that begins again from a smaller model says of that; `None` of one that goes on with the model of the round before.
+fn anew(found: &Discovery, nth: usize) -> Option<String> {
+    let model = |round: &Round| round.with.iter().copied().chain(round.taken).collect::<Vec<_>>();
+    let before = found.rounds.get(nth.checked_sub(1)?)?;
+    let goes_on = model(before).iter().all(|effect| found.rounds[nth].with.contains(effect));
+    if before.taken.is_some() && goes_on {
+        return None;
+    }
+    let ends = found.rounds[nth..].iter().position(|round| round.taken.is_none());
+    let end = ends.map_or(found.rounds.len(), |ends| nth + ends + 1);
+    let now: Vec<&str> = found.rounds[nth..end].iter().flat_map(model).collect();
+    let without: Vec<&str> = model(before).into_iter().filter(|effect| !now.contains(effect)).collect();
+    if without.is_empty() {
+        return Some("The search begins anew.".into());
+    }
+    let has_rival = |effect: &&str| {
+        let one = found.given_up.iter().find(|one| one.effect == *effect);
+        one.is_some_and(|one| matches!(one.because, Because::Rival(_) | Because::NearestForm(_)))
+    };
+    let why = if without.iter().all(has_rival) { ", which a rival took over" } else { "" };
+    Some(format!("The search begins anew, without {}{why}.", list(&without)))
+}
+
+/// What became of an effect that a round fitted.
+fn fate(round: &Round, effect: &str, found: &Discovery) -> String {
+    match round.taken {
+        Some(taken) if taken != effect => format!("not taken: {taken} has greater odds"),
+        Some(_) if found.steps.iter().any(|step| step.effect == effect) => "taken".into(),
+        Some(_) => "taken, given up later".into(),
+        None => "not taken".into(),
+    }
+}
+
+fn round(f: &mut fmt::Formatter<'_>, nth: usize, found: &Discovery) -> fmt::Result {
+    let round = &found.rounds[nth];
     let with = if round.with.is_empty() {
         "the base model alone".into()
     } else {
         format!("the model has {}", list(&round.with))
     };
-    writeln!(f, "<h3>Round {nth}: {}</h3>", Text(with))?;
+    writeln!(f, "<h3>Round {}: {}</h3>", nth + 1, Text(with))?;
+    if let Some(anew) = anew(found, nth) {
+        writeln!(f, "<p>{}</p>", Text(anew))?;
+    }
     let (fitted, scored): (Vec<&TriedEffect>, Vec<&TriedEffect>) =
         round.candidates.iter().partition(|candidate| candidate.heldout_rms_counts.is_some());
-    if !fitted.is_empty() {
+    let is_any = !fitted.is_empty();
+    if is_any {
         let mut table = Table::new(&[
             Column::Name("effect"),
             Column::Number("score"),
             Column::Number("p, corrected"),
-            Column::Number("held out / counts rms"),
-            Column::Number("held out / noise"),
-            Column::Number("gap closed"),
-            Column::Name(""),
+            Column::Number("with it / counts rms"),
+            Column::Number("with it / noise"),
+            Column::Number("closed with it, by mean squares"),
+            Column::Prose(""),
         ]);
         for candidate in fitted {
-            let is_kept = found.steps.iter().any(|step| step.effect == candidate.effect);
-            let taken = match (round.taken == Some(candidate.effect), is_kept) {
-                (true, true) => "taken",
-                (true, false) => "taken, given up later",
-                (false, _) => "",
-            };
             let or_dash = |value: Option<f64>| value.map_or_else(|| "\u{2013}".into(), |rms| digits(rms, 3));
             let rms = candidate.heldout_rms_counts;
             table.row([
@@ -81,7 +112,7 @@ fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round, found: &Discover
                 &or_dash(rms),
                 &or_dash(rms.zip(found.floor.rms_counts()).map(|(rms, noise)| rms / noise)),
                 &candidate.shrink.map_or_else(|| "\u{2013}".into(), percent),
-                taken,
+                &fate(round, candidate.effect, found),
             ]);
         }
         writeln!(f, "{table}")?;
@@ -99,6 +130,7 @@ fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round, found: &Discover
     }
     match round.taken {
         Some(_) => Ok(()),
-        None => writeln!(f, "<p>None was taken.</p>"),
+        None if is_any => writeln!(f, "<p>None was taken: none of them raises the odds enough.</p>"),
+        None => writeln!(f, "<p>None was fitted, so none was taken.</p>"),
     }
 }

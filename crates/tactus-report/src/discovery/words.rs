@@ -1,20 +1,28 @@
 //! The verdict of a discovery in words.
 
-use tactus_discover::{AddedEffect, Closed, Discovery, Floor, GivenUp, Verdict};
+use tactus_discover::{AddedEffect, Because, Closed, Discovery, Estimated, Floor, GivenUp, Round, Verdict};
+use tactus_model::Effect;
+use tactus_model::effect::Definition;
 
 use super::active::command;
 use super::faulty;
 use crate::numbers::{digits, short};
 use crate::plot::number;
 
-/// An effect that was given up and would close this share of the gap is told in the verdict.
+/// An effect that was given up and alone would close this share of the gap is told in the verdict.
 const CLOSES_MUCH: f64 = 0.5;
+/// A share below this one rounds to no percent.
+const SHARE_LEAST: f64 = 0.000_5;
+/// Covariates that a sentence names.
+const NAMED_MOST: usize = 3;
+/// A parameter nearer to the end of its range than this share of it is at its end.
+const BOUND_SHARE: f64 = 1e-3;
 
 /// What a fit shows and is no name, and why.
 fn tentative(found: &Discovery) -> Option<String> {
     let why = |effect: &str| {
         let known = found.given_up.iter().rfind(|one| one.effect == effect);
-        known.map_or_else(|| UNCONFIRMED.to_owned(), GivenUp::in_words)
+        known.map_or_else(|| UNCONFIRMED.to_owned(), because)
     };
     let of = |step: &AddedEffect| format!("Tentative: {}: {}.", step.effect, why(step.effect));
     let each: Vec<String> = found.tentative.iter().map(of).collect();
@@ -38,7 +46,7 @@ fn drafted(found: &Discovery) -> Option<String> {
 pub fn in_words(found: &Discovery) -> String {
     let before = digits(found.base.heldout_rms_counts, 3);
     let after = digits(found.final_.level.heldout_rms_counts, 3);
-    let added = list(found.steps.iter().map(|step| step.effect));
+    let added = list(found.steps.iter().map(or_others));
     let noise_is = found.floor.rms_counts().map_or_else(
         || "the size of the noise is unknown".into(),
         |noise| format!("the noise is {} counts, from {}", digits(noise, 3), found.floor.source()),
@@ -126,34 +134,179 @@ fn runs(found: &Discovery) -> String {
     })
 }
 
-/// The covariates on which what is left depends. How much that is, is told before.
+/// What is left, and on what it depends. How much that is, is told before.
 fn left(found: &Discovery) -> String {
-    match &found.unexplained.depends_on[..] {
-        [] => "What is left depends on no covariate examined.".to_owned(),
-        depends_on => format!("What is left depends on {}.", list(depends_on.iter().copied())),
+    if found.unexplained.depends_on.is_empty() {
+        return "What is left depends on no covariate examined.".to_owned();
+    }
+    format!("What is left depends on {}.", depends_on(found))
+}
+
+/// The covariates on which what is left depends: the three with the largest dependence, those that are not in its table, and how many
+/// others there are.
+pub(super) fn depends_on(found: &Discovery) -> String {
+    let left = &found.unexplained;
+    let is_named = |(nth, name): &(usize, &&str)| {
+        *nth < NAMED_MOST || left.gap.iter().all(|gap| gap.covariate != **name)
+    };
+    let named = left.depends_on.iter().enumerate().filter(is_named).map(|(_, name)| (*name).to_owned());
+    let mut named: Vec<String> = named.collect();
+    let more = left.depends_on.len() - named.len();
+    if more > 0 {
+        named.push(format!("{more} more (in the table of the report)"));
+    }
+    list(named)
+}
+
+/// Why an effect was given up, as a clause.
+pub(super) fn because(one: &GivenUp) -> String {
+    // The clause has the share, which would be told as 0 or less.
+    if let Because::Far(share) = one.because
+        && share < 0.005
+    {
+        return "it comes nearest, and closes nothing of the gap on held-out presses: an effect closes more of its own physics"
+            .into();
+    }
+    one.in_words()
+}
+
+/// What a fitted effect closes of the gap on held-out presses, by mean squares.
+pub(super) enum WouldClose<'a> {
+    /// By itself.
+    Alone(f64),
+    /// Together with others.
+    With {
+        /// The others.
+        others: &'a [&'static str],
+        /// What it closes with them.
+        share: f64,
+        /// What they close without it, if they were fitted so.
+        without: Option<f64>,
+    },
+}
+
+impl<'a> WouldClose<'a> {
+    /// What an effect would close: by itself, if it was fitted so, else with the others beside which it closes most. `None` if no round
+    /// fitted it.
+    pub(super) fn of(found: &'a Discovery, effect: &str) -> Option<Self> {
+        let tried = |round: &'a Round| Some((&round.with[..], shrink(round, effect)?));
+        let tried: Vec<(&[&str], f64)> = found.rounds.iter().filter_map(tried).collect();
+        let most = |is_alone: bool| {
+            let of = tried.iter().filter(|(with, _)| with.is_empty() == is_alone);
+            of.copied().max_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        if let Some((_, share)) = most(true) {
+            return Some(Self::Alone(share));
+        }
+        let (others, share) = most(false)?;
+        Some(Self::With { others, share, without: closed_by(found, others) })
+    }
+
+    /// Such as `alone it would close 35 % of the gap`.
+    pub(super) fn in_words(&self) -> String {
+        match self {
+            Self::Alone(share) => format!("alone it would close {} of the gap", closes(*share)),
+            Self::With { others, share, without } => {
+                let they_do = match others {
+                    [one] => format!("{one} does"),
+                    _ => "they do".to_owned(),
+                };
+                let points = without.map(|without| (100.0 * share).round() - (100.0 * without).round());
+                let more = points.map_or_else(String::new, |points| match points {
+                    1.0.. => format!(", {} more than {they_do}", in_points(points)),
+                    ..=-1.0 => format!(", {} less than {they_do}", in_points(-points)),
+                    _ => format!(", no more than {they_do}"),
+                });
+                format!("with {} it closes {} of the gap{more}", list(*others), closes(*share))
+            }
+        }
     }
 }
 
-/// The share of the gap that an effect which was given up would close: the greatest of the rounds that fitted it.
-pub(super) fn would_close(found: &Discovery, one: &GivenUp) -> Option<f64> {
-    let tried = found.rounds.iter().flat_map(|round| &round.candidates);
-    tried.filter(|tried| tried.effect == one.effect).filter_map(|tried| tried.shrink).reduce(f64::max)
+/// Such as `2 points`.
+fn in_points(points: f64) -> String {
+    format!("{} point{}", short(points, 0), if points > 1.0 { "s" } else { "" })
 }
 
-/// The effect that was given up although it would close most of the gap, if one would close much.
+/// The share of the gap that an effect closes with what the model has in a round, if it was fitted there.
+fn shrink(round: &Round, effect: &str) -> Option<f64> {
+    round.candidates.iter().find(|tried| tried.effect == effect)?.shrink
+}
+
+/// The share of the gap that these effects close together, if a round fitted them so.
+fn closed_by(found: &Discovery, effects: &[&str]) -> Option<f64> {
+    found.rounds.iter().filter(|round| round.with.len() + 1 == effects.len()).find_map(|round| {
+        let last = effects.iter().find(|effect| !round.with.contains(effect))?;
+        let is_rest = round.with.iter().all(|with| effects.contains(with));
+        is_rest.then(|| shrink(round, last)).flatten()
+    })
+}
+
+/// The effect that was given up although it alone would close most of the gap, if one would close much.
 fn nearest(found: &Discovery) -> String {
-    let known = found.given_up.iter().filter_map(|one| Some((one, would_close(found, one)?)));
+    let known = found.given_up.iter().filter_map(|one| match WouldClose::of(found, one.effect)? {
+        WouldClose::Alone(share) => Some((one, share)),
+        WouldClose::With { .. } => None,
+    });
     known.filter(|(_, share)| *share >= CLOSES_MUCH).max_by(|a, b| a.1.total_cmp(&b.1)).map_or_else(
         String::new,
         |(one, share)| {
             format!(
-                " {} would close {} of it, but is not named: {}.",
+                " {} alone would close {} of it, but is not named: {}.",
                 one.effect,
                 percent(share),
-                one.in_words()
+                because(one)
             )
         },
     )
+}
+
+/// An added effect with those that the data cannot distinguish from it, such as `hardening (or softening)`.
+fn or_others(step: &AddedEffect) -> String {
+    if step.equivalent.is_empty() {
+        return step.effect.to_owned();
+    }
+    format!("{} (or {})", step.effect, either(&step.equivalent))
+}
+
+/// The definition of an added effect; `None` of a random walk, which is no effect of the model. A draft is in no registry.
+pub fn definition(found: &Discovery, step: &AddedEffect) -> Option<&'static Definition> {
+    let own = found.effects.iter().find(|effect| effect.name() == step.effect).map(Effect::definition);
+    own.or_else(|| Definition::find(step.effect).ok())
+}
+
+/// The parameters of an added effect that are at the end of their range or that the data hardly determine, a sentence each.
+pub fn flags(found: &Discovery, step: &AddedEffect) -> Vec<String> {
+    let Some(definition) = definition(found, step) else { return Vec::new() };
+    step.terms.iter().flatten().filter_map(|parameter| flag(definition, parameter)).collect()
+}
+
+fn flag(definition: &Definition, found: &Estimated) -> Option<String> {
+    let known = definition.parameters.iter().find(|known| known.name == found.name)?;
+    let error = found.standard_error?;
+    let Estimated { name, value, .. } = found;
+    let slack = BOUND_SHARE * (known.range[1] - known.range[0]);
+    if let Some(end) = known.range.into_iter().find(|end| (value - end).abs() <= slack) {
+        // Many parameters do nothing at the end of their range, and may be there.
+        let is_neutral = (end - known.neutral).abs() <= slack;
+        let what = if is_neutral {
+            "does nothing"
+        } else {
+            "is at the end of its range: the true value may lie beyond"
+        };
+        return Some(format!("{name} {what}."));
+    }
+    (value.abs() < error).then(|| {
+        format!("{name} has a standard error greater than its value: these data hardly determine it.")
+    })
+}
+
+/// `a`, `a or b`, `a, b or c`.
+pub(super) fn either(names: &[&str]) -> String {
+    match names {
+        [most @ .., last] if !most.is_empty() => format!("{} or {last}", most.join(", ")),
+        names => names.concat(),
+    }
 }
 
 /// `a`, `a and b`, `a, b and c`.
@@ -177,9 +330,17 @@ pub(super) fn percent(share: f64) -> String {
     format!("{} %", short(percent, usize::from((percent - 100.0).abs() < 2.0 || percent.abs() < 2.0)))
 }
 
-/// Such as `83 % +- 6 %` or `99.96 % +- 0.03 %`.
+/// A share after `closes`: `97 %` or `nothing`.
+fn closes(share: f64) -> String {
+    if share < SHARE_LEAST { "nothing".into() } else { percent(share) }
+}
+
+/// Such as `83 % +- 6 %` or `99.96 % +- 0.03 %`; `nothing` of a share that is 0 or below.
 pub fn closed(of_gap: Closed) -> String {
     let (share, error) = closed_and_error(of_gap);
+    if of_gap.share <= 0.0 || !share.contains(|letter| matches!(letter, '1'..='9')) {
+        return "nothing".into();
+    }
     error.map_or_else(|| share.clone(), |error| format!("{share} +- {error}"))
 }
 
@@ -187,8 +348,15 @@ pub fn closed(of_gap: Closed) -> String {
 pub(super) fn closed_and_error(Closed { share, standard_error, .. }: Closed) -> (String, Option<String>) {
     let Some(error) = standard_error else { return (percent(share), None) };
     let places = if error < 0.000_95 { 2 } else { usize::from(error < 0.0095) };
-    let in_percent = |share: f64| format!("{} %", short(share, places));
+    let in_percent = |share: f64| format!("{} %", number(share, places));
     (in_percent(100.0 * share), Some(in_percent((100.0 * error).max(0.01))))
+}
+
+/// Both ends of a range with the same decimals: the larger one has three digits.
+pub(super) fn ends(range: [f64; 2]) -> [String; 2] {
+    let larger = digits(range[0].abs().max(range[1].abs()), 3);
+    let decimals = larger.split_once('.').map_or(0, |(_, fraction)| fraction.len());
+    range.map(|end| number(end, decimals))
 }
 
 /// A residual in counts and in units of the noise.

@@ -11,14 +11,14 @@ use crate::made_up::discovery::{
 };
 use serde_json::Value;
 use tactus_discover::{
-    Because, Closed, Discovery, DraftedEffect, FittedCurve, FittedKnot, GivenUp, GlobalTest, LeftOut,
-    NextExperiment, NoDraft, RefutedFormula, Unexplained, Verdict,
+    Because, Closed, Discovery, DraftedEffect, Estimated, FittedCurve, FittedKnot, Gap, GivenUp, GlobalTest,
+    LeftOut, NextExperiment, NoDraft, RefutedFormula, Round, TriedEffect, Unexplained, Verdict,
 };
-use tactus_model::Array;
 use tactus_model::effect::Definition;
+use tactus_model::{Array, Effect};
 use tactus_report::discovery::{
-    ActiveRun, AmbiguousEffect, DiscoveryReport, LabEffect, discovery_html, discovery_json, element_maps,
-    in_words, not_proposed, not_shown, proposals, residual_against, staircase,
+    ActiveRun, AmbiguousEffect, DiscoveryReport, LabEffect, closed, discovery_html, discovery_json,
+    element_maps, in_words, not_proposed, not_shown, proposals, residual_against, staircase,
 };
 use tactus_schema::draft::DraftStatus;
 
@@ -156,8 +156,8 @@ fn a_draft_has_its_sentence_its_curve_and_what_speaks_for_it() {
         "badge warn\">drafted<",
         "Curve of draft-1",
         "power: scale \u{2212}0.0125, exponent 2.00",
-        "sum of signals, 0.00 to 4.00 mm",
-        "saturation (76.2 behind)",
+        "sum of signals, 0.00 to 4.00 mm (times the mean sensitivity: 0 to 4000 counts)",
+        "saturation (behind by 76.2 in the logarithm of the odds), hardening (behind by 98.0)",
         "depth in contact, by temperature",
         "5 of 5",
         "3.45 counts rms",
@@ -276,7 +276,7 @@ fn what_is_not_known_is_null_and_the_text_is_always_the_same() {
 fn the_verdict_says_what_it_rests_on() {
     assert_eq!(
         in_words(&explained()),
-        "The model was missing hysteresis and miswired. On held-out presses the residual falls from 9.36 to 2.08 counts rms, which \
+        "The model was missing hysteresis (or backlash) and miswired. On held-out presses the residual falls from 9.36 to 2.08 counts rms, which \
          closes 99.6 % +- 0.4 % of the gap between model and noise; the noise is 2.00 counts, from repeats in time. Of readings with a signal, 0.29 \
          times the noise (0.57 counts) is not noise; with 95 % confidence it is at most 0.36 times the noise (0.71 counts). A structured \
          residual of 2.50 counts was declared tolerable beforehand. Faulty: element 18 answers for 19 and element 19 answers for 18."
@@ -292,7 +292,7 @@ fn the_verdict_says_what_it_rests_on() {
         "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms and the noise \
          is 2.00 counts, from repeats of a place. Of readings with a signal, 4.6 times the noise (9.1 counts) is not noise; with 95 % \
          confidence it is at most 5.7 times the noise (11 counts). What is left depends on time since contact and depth. \
-         hysteresis would close 82 % of it, but is not named: a dependence on place along x that is no effect explains more."
+         hysteresis alone would close 82 % of it, but is not named: a dependence on place along x that is no effect explains more."
     );
     assert_eq!(
         in_words(&cannot_judge()),
@@ -364,7 +364,7 @@ fn what_cannot_be_shown_comes_first_and_what_it_rests_on_last() {
         "softening, imprint: no press is followed",
         "To know before using a number",
         ">explained</span>",
-        "The model was missing hysteresis and miswired.",
+        "The model was missing hysteresis (or backlash) and miswired.",
         "Where the gap is",
         "The residual against each covariate",
         "The residual of each element",
@@ -373,7 +373,7 @@ fn what_cannot_be_shown_comes_first_and_what_it_rests_on_last() {
         "taken, given up later",
         "Round 4: the model has misregistration, hysteresis and miswired",
         "<h3>Given up</h3>",
-        "<li>gain-drift, though it would close 61 % of the gap: hysteresis explains more in its place.</li>",
+        "<li>gain-drift: hysteresis explains more in its place (with misregistration it closes 61 % of the gap).</li>",
         "What was added",
         "The gap before and after",
         "What stays unexplained",
@@ -398,15 +398,19 @@ fn the_pages_numbers_are_those_that_were_found() {
         "<dd>9.36 <small>4.68 &#215; noise</small></dd>",
         "<dt>gap closed</dt><dd>99.6 % <small>&#177; 0.4 %</small></dd>",
         "<dd>96 <small>24 held out</small></dd>",
-        "<td>time since contact</td><td class=\"n\">0.400</td><td class=\"n\">30.0</td><td>s</td><td class=\"n\">3.81</td><td class=\"n\">&lt; 0.001</td>",
-        "<td>hysteresis</td><td class=\"n\">39.4</td><td class=\"n\">&lt; 0.001</td><td class=\"n\">4.31</td><td class=\"n\">2.15</td><td class=\"n\">82 %</td><td>taken</td>",
+        "<td>time since contact</td><td class=\"n\">0.4</td><td class=\"n\">30.0</td><td>s</td><td class=\"n\">3.81</td><td class=\"n\">&lt; 0.001</td>",
+        "<td>hysteresis</td><td class=\"n\">39.4</td><td class=\"n\">&lt; 0.001</td><td class=\"n\">4.31</td><td class=\"n\">2.15</td><td class=\"n\">82 %</td><td class=\"prose\">taken</td>",
         "Scored only: hardening (3.2, p 0.410) and crosstalk (1.1, p 1.000).",
         "Load and unload differ, independent of rate.",
         "<th class=\"n\">loss_share</th><th class=\"n\">threshold_mm</th>",
         "<td>found</td><td class=\"n\">0.123 \u{b1} 0.004</td><td class=\"n\">0.0510 \u{b1} 0.0020</td>",
         "<td>possible range</td><td class=\"n\">\u{2212}1 to 5</td><td class=\"n\">0.001 to 2</td>",
         "<td>found, 2</td><td class=\"n\">19</td><td class=\"n\">18</td>",
-        "cannot distinguish it from backlash",
+        "cannot distinguish it from backlash, which explains the fitted presses nearly as well",
+        "<th class=\"n\">closed with it, by mean squares</th>",
+        "closes 99.6 % +- 0.4 % of the base model's gap. The share is the fall of the mean square",
+        "<td class=\"n\">13 %</td><td class=\"prose\">not taken: hysteresis has greater odds</td>",
+        "each has at most 3 %; before the data each effect had a probability of 5 %.",
         "The data distinguish it from every other effect",
         "and fitted again with the rest: misregistration.",
         "<td>residual / noise</td><td class=\"n\">4.68</td><td class=\"n\">1.04</td>",
@@ -447,7 +451,7 @@ fn what_no_effect_matches_has_no_name() {
         ">unexplained</span>",
         "from repeats of a place",
         "depends on time since contact and depth",
-        "None was taken",
+        "None was taken: none of them raises the odds enough.",
     ] {
         assert!(html.contains(text), "{text}");
     }
@@ -603,8 +607,10 @@ fn a_parameter_at_the_end_of_its_range_or_within_its_error_is_flagged() {
         "threshold_mm has a standard error greater than its value: these data hardly determine it.",
     ] {
         assert!(html.contains(text), "{text}");
+        assert!(json(&discovery)["steps"][0]["flags"].to_string().contains(text), "{text}");
     }
     assert!(!self::html(&explained()).contains("end of its range"));
+    assert_eq!(json(&explained())["steps"][0]["flags"].to_string(), "[]");
 }
 
 #[test]
@@ -613,4 +619,159 @@ fn the_effects_of_the_lab_are_told_with_their_version() {
     let lab = [LabEffect { name: "grounding".into(), status: DraftStatus::Drafted, sha256: "5a5a".into() }];
     let html = discovery_html(&DiscoveryReport { lab: &lab, ..report(&array, &data, &found) });
     assert!(html.contains("effect of the lab") && html.contains("grounding") && html.contains("5a5a"));
+}
+
+#[test]
+fn a_share_that_is_closed_beside_others_is_not_told_as_if_it_were_closed_alone() {
+    let whole = unexplained();
+    let first = &whole.rounds[0].candidates[0];
+    let round = |with: &[&'static str], tried: &[(&'static str, f64)], taken| Round {
+        with: with.to_vec(),
+        candidates: tried
+            .iter()
+            .map(|(effect, shrink)| TriedEffect { effect, shrink: Some(*shrink), ..first.clone() })
+            .collect(),
+        taken,
+    };
+    let pair = ["indenter-size", "edge-effect"];
+    let given_up = |effect, because| GivenUp { effect, because };
+    let found = Discovery {
+        rounds: vec![
+            round(&[], &[("indenter-size", 0.879)], Some("indenter-size")),
+            round(&pair[..1], &[("edge-effect", 0.937), ("gain-drift", -3.46)], Some("edge-effect")),
+            round(&pair, &[("surface-tilt", 0.959)], None),
+            round(&[], &[("indenter-size", 0.879)], Some("indenter-size")),
+            round(&pair[..1], &[("edge-effect", 0.937)], Some("edge-effect")),
+            round(&pair, &[], None),
+            round(&[], &[("hardening", -0.000_4), ("softening", 0.31)], None),
+        ],
+        given_up: vec![
+            given_up("surface-tilt", Because::Little),
+            given_up("indenter-size", Because::Rival("sum of signals")),
+            given_up("edge-effect", Because::Rival("sum of signals")),
+            given_up("hardening", Because::Far(-0.002)),
+        ],
+        ..whole.clone()
+    };
+    let text = in_words(&found);
+    assert!(text.contains("indenter-size alone would close 88 % of it, but is not named"), "{text}");
+    assert!(!text.contains("surface-tilt"), "{text}");
+    let page = html(&found);
+    show("anew.html", &page);
+    for text in [
+        "by itself or beside the others (with indenter-size and edge-effect it closes 96 % of the gap, 2 points more than they do).",
+        "(with indenter-size it closes 94 % of the gap, 6 points more than indenter-size does).",
+        "closes nothing of the gap on held-out presses: an effect closes more of its own physics (alone it would close nothing of the gap).",
+        "Round 4: the base model alone</h3>\n<p>The search begins anew.</p>",
+        "Round 7: the base model alone</h3>\n<p>The search begins anew, without indenter-size and edge-effect, which a rival took over.</p>",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    assert_eq!(page.matches("begins anew").count(), 2);
+}
+
+/// The draft of [`draft`] is in the model, as after a confirmation.
+fn with_added_draft() -> Discovery {
+    let mut discovery = explained();
+    let definition = draft().draft.define().unwrap();
+    discovery.steps.truncate(1);
+    let step = &mut discovery.steps[0];
+    step.effect = definition.name;
+    step.equivalent.clear();
+    step.terms = vec![vec![Estimated { name: "strength", value: 1.01, standard_error: Some(0.02) }]];
+    discovery.effects.push(Effect::neutral(definition));
+    discovery
+}
+
+#[test]
+fn an_added_draft_keeps_its_sentence_its_curve_and_its_facts() {
+    let page = html(&with_added_draft());
+    show("added-draft.html", &page);
+    for text in [
+        "<h3>draft-1</h3>\n<p>While the tool touches, the signal changes by a share &lt;that&gt; follows the sum of signals.</p>",
+        "<td>found</td><td class=\"n\">1.010 \u{b1} 0.020</td>",
+        "Curve of draft-1",
+        "<td>law</td><td>power: scale \u{2212}0.0125, exponent 2.00</td>",
+        "sum of signals, 0.00 to 4.00 mm",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn what_the_folds_of_presses_do_not_test_has_no_probability() {
+    let mut discovery = explained();
+    discovery.steps[0].folds_p_value = f64::NAN;
+    assert_eq!(json(&discovery)["steps"][0]["folds_p_value"], Value::Null);
+    let page = html(&discovery);
+    assert!(page.contains("On fitted presses it is not tested: beside a random walk"));
+    assert_eq!(page.matches("this decides whether the effect is confirmed").count(), 1);
+}
+
+#[test]
+fn the_headline_and_the_levels_tell_what_a_draft_gains() {
+    let page = html(&Discovery { draft: Some(Ok(Box::new(draft()))), ..unexplained() });
+    for text in [
+        "<dt>with draft-1 / counts</dt><dd>2.11 <small>1.05 &#215; noise</small></dd>",
+        "<dt>draft-1 closes, of what is left</dt><dd>93 % <small>&#177; 4 %</small></dd>",
+        "<th class=\"n\">with the draft</th>",
+        "<td>residual / noise</td><td class=\"n\">4.68</td><td class=\"n\">4.68</td><td class=\"n\">1.05</td>",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    assert!(!html(&unexplained()).contains("with the draft"));
+}
+
+#[test]
+fn what_is_left_names_three_covariates_and_counts_the_others() {
+    let names = ["depth", "time", "speed", "press", "signal"];
+    let whole = unexplained();
+    let gap = |covariate: &&'static str| Gap { covariate, ..whole.gap[0].clone() };
+    let found = Discovery {
+        unexplained: Unexplained {
+            depends_on: names.into_iter().chain(["noise that grows with the signal"]).collect(),
+            gap: names.iter().map(gap).collect(),
+            share: 1.0,
+        },
+        ..whole.clone()
+    };
+    let told = "depends on depth, time, speed, noise that grows with the signal and 2 more (in the table of the report)";
+    assert!(in_words(&found).contains(&format!("What is left {told}.")), "{}", in_words(&found));
+    assert!(html(&found).contains(&format!("What is left of the gap {told}, and no effect")));
+}
+
+#[test]
+fn what_is_left_of_an_explained_gap_is_no_warning() {
+    let left = Unexplained { depends_on: vec!["depth"], gap: vec![], share: 0.01 };
+    let mut found = Discovery { unexplained: left, ..explained() };
+    let told = |found: &Discovery| {
+        let page = html(found);
+        assert!(!page.contains("no effect of the library explains it"));
+        page
+    };
+    assert!(told(&found).contains(
+        "<p>What is left is seen, but certainly below half the noise; it does not count. It depends on depth.</p>"
+    ));
+    found.final_.level.structured.as_mut().unwrap().upper_noise = 0.7;
+    assert!(told(&found).contains("certainly below the tolerance that was declared beforehand;"));
+}
+
+#[test]
+fn both_ends_of_a_range_have_the_same_decimals() {
+    let mut found = explained();
+    found.gap[0].range = [0.999_999_999, 1.000_000_1];
+    found.gap[1].range = [-1.8e-15, 0.001];
+    let page = html(&found);
+    for text in [
+        "<td class=\"n\">1.00</td><td class=\"n\">1.00</td>",
+        "<td class=\"n\">0.00000</td><td class=\"n\">0.00100</td>",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn a_gap_that_is_not_closed_is_closed_by_nothing() {
+    let closed = |share| closed(Closed { share, standard_error: Some(0.001), most: 1.0 });
+    assert_eq!([closed(-0.002), closed(0.0), closed(0.97)], ["nothing", "nothing", "97.0 % +- 0.1 %"]);
 }

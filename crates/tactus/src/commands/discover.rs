@@ -22,9 +22,10 @@ use tactus_report::discovery::{
     ActiveRun, DataSource, DiscoveryReport, LabEffect, discovery_html, discovery_json, draft_status,
 };
 use tactus_schema::draft::{DraftEvidence, DraftFile, DraftStatus, Nearest};
-use tactus_schema::{Model, Rig};
+use tactus_schema::{Model, ModelFileError, Rig, stated_schema};
 
 use crate::cli::{Ablation, Common, DiscoverArgs};
+use crate::commands::library::Held;
 use crate::exit::{Exit, Failure};
 use crate::output;
 use crate::progress::{Busy, DiscoveryProgress};
@@ -32,6 +33,8 @@ use measurements::Measurements;
 use stages::StageLog;
 use twin_experiments::TwinExperiments;
 use unfinished::UnfinishedFolder;
+
+pub(in crate::commands) use settled::confirm;
 
 /// What a discovery writes: the report, its numbers, the grown model and the residuals.
 const FILES: [&str; 4] = ["report.html", "report.json", "model.toml", "residuals.parquet"];
@@ -49,8 +52,11 @@ struct Discovered {
     active: Vec<ActiveRun>,
     /// Why `--active` ran no further experiment, although there was a round for it.
     active_ended: Option<String>,
-    /// Drafts of which an experiment of `--active` has told whether they hold, and a sentence on each.
+    /// Drafts of this discovery of which an experiment of `--active` has told whether they hold.
     settled: Vec<DraftFile>,
+    /// The same of the lab's library, whose files are written at the end.
+    remeasured: Vec<Held>,
+    /// A sentence on each.
     settled_in_words: Vec<String>,
 }
 
@@ -70,18 +76,23 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     let declared = args.model.as_deref().map(declared).transpose()?;
     let folder = UnfinishedFolder::create(&args.out)?;
     let stages = StageLog::default();
-    let (lab, library): (Vec<LabEffect>, Vec<&'static Definition>) =
-        args.library.in_use()?.into_iter().unzip();
+    let library = args.library.in_use()?;
+    let lab = library.iter().map(Held::for_report).collect::<anyhow::Result<_>>()?;
     let analyse = |files: &[PathBuf], live: Option<&LiveRig>, drafts: &[&'static Definition]| {
-        let drafts = [&library, drafts].concat();
-        analysed(common, args, declared.clone(), files, live, &drafts, &stages)
+        analysed(common, args, declared.clone(), files, live, drafts, &stages)
     };
-    let mut discovered =
-        if args.active { active::discover(common, args, analyse)? } else { analyse(&args.files, None, &[])? };
+    let mut discovered = if args.active {
+        active::discover(common, args, &library, analyse)?
+    } else {
+        let drafts = library.iter().map(|one| one.draft.define()).collect::<Result<Vec<_>, _>>()?;
+        analyse(&args.files, None, &drafts)?
+    };
     discovered.lab = lab;
+    discovered.discovery.warnings.extend(args.library.is_missing());
     let busy = Busy::with("writing", common.json);
     discovered.write(folder.path())?;
     folder.finish()?;
+    discovered.remeasured.iter().try_for_each(Held::write)?;
     drop(busy);
     args.stages.as_deref().map(|path| stages.finish(path)).transpose()?;
     let drafts = discovered.drafts()?;
@@ -154,6 +165,7 @@ fn analysed(
         active: Vec::new(),
         active_ended: None,
         settled: Vec::new(),
+        remeasured: Vec::new(),
         settled_in_words: Vec::new(),
     })
 }
@@ -194,6 +206,7 @@ impl Discovered {
         Ok(Some(DraftFile {
             draft: found.draft.clone(),
             status: draft_status(found),
+            was: None,
             covariance: found.covariance.clone(),
             nearest: nearest
                 .map(|(class, behind)| Nearest { class: (*class).to_owned(), ln_odds_behind: *behind })
@@ -227,11 +240,19 @@ impl Discovered {
     }
 }
 
+/// What is wrong with the text of a model file. A draft is no model.
+pub(crate) fn no_model(text: &str, error: &ModelFileError) -> String {
+    let is_draft = stated_schema(text) == Some(tactus_schema::draft::SCHEMA);
+    let hint = if is_draft { "; a draft acts in a model: discovery wrote model.toml beside it" } else { "" };
+    format!("{error}{hint}")
+}
+
 /// Reads a model file.
 fn declared(path: &Path) -> anyhow::Result<Model> {
     let text = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-    let model = Model::from_toml(&text);
-    Ok(model.map_err(|error| Failure::new(Exit::Usage, format!("{}: {error}", path.display())))?)
+    let refused =
+        |error| Failure::new(Exit::Usage, format!("{}: {}", path.display(), no_model(&text, &error)));
+    Ok(Model::from_toml(&text).map_err(refused)?)
 }
 
 /// Reads the start model: the given model file, or the base model of the rig file.

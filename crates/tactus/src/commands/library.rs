@@ -5,7 +5,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
-use tactus_model::effect::Definition;
 use tactus_report::discovery::LabEffect;
 use tactus_schema::DraftFile;
 
@@ -22,6 +21,21 @@ pub(crate) struct Held {
     pub(crate) draft: DraftFile,
 }
 
+/// A file of the library that is no draft of it.
+pub(crate) struct Refused {
+    pub(crate) path: PathBuf,
+    pub(crate) problem: String,
+}
+
+/// What the library's folder holds.
+#[derive(Default)]
+pub(crate) struct Library {
+    /// The drafts, in order of their files' names.
+    pub(crate) held: Vec<Held>,
+    /// Files that cannot be read, are no drafts, or have the name of an earlier one.
+    pub(crate) refused: Vec<Refused>,
+}
+
 impl LibraryOption {
     /// The library's folder: the named one, else that in the state directory; `None` without either.
     pub(crate) fn folder(&self) -> Option<PathBuf> {
@@ -33,83 +47,119 @@ impl LibraryOption {
         self.library.clone().or_else(|| state().map(|state| state.join(FOLDER)))
     }
 
-    /// All drafts of the library, in order of their files' names; none if nobody named a folder and the default is not there.
+    /// What is in the library; nothing if its folder is not there.
     ///
     /// # Errors
-    /// If the folder or a file cannot be read, if a file is no draft, or if two drafts have one name.
-    pub(crate) fn read(&self) -> anyhow::Result<Vec<Held>> {
-        match self.folder() {
-            Some(folder) if self.library.is_some() || folder.is_dir() => read(&folder),
-            _ => Ok(Vec::new()),
-        }
+    /// If the folder cannot be read.
+    pub(crate) fn read(&self) -> anyhow::Result<Library> {
+        self.folder()
+            .filter(|folder| folder.exists())
+            .map_or_else(|| Ok(Library::default()), |folder| read(&folder))
+    }
+
+    /// A warning if somebody named a folder that is not there.
+    pub(crate) fn is_missing(&self) -> Option<String> {
+        let folder = self.library.as_ref().filter(|folder| !folder.exists())?;
+        Some(format!("the library {} is not there, so no draft of it was tried", folder.display()))
     }
 
     /// The drafts that are in use: neither refuted nor retired.
     ///
     /// # Errors
-    /// As [`LibraryOption::read`].
-    pub(crate) fn in_use(&self) -> anyhow::Result<Vec<(LabEffect, &'static Definition)>> {
-        let in_use = self.read()?.into_iter().filter(|one| one.draft.status.is_in_use());
-        let of = |one: Held| {
-            let sha256 = sha256::of_file(&one.path)?;
-            let effect = LabEffect { name: one.draft.draft.name.clone(), status: one.draft.status, sha256 };
-            Ok((effect, one.draft.define()?))
-        };
-        in_use.map(of).collect()
+    /// If the folder or a file of it cannot be read, if a file is no draft, or if two drafts have one name.
+    pub(crate) fn in_use(&self) -> anyhow::Result<Vec<Held>> {
+        let Library { mut held, refused } = self.read()?;
+        if let Some(Refused { path, problem }) = refused.first() {
+            let folder = path.parent().unwrap_or(path).display();
+            let what = format!("{}: {problem}; correct it or move it out of {folder}", path.display());
+            return Err(Failure::new(Exit::Usage, what).into());
+        }
+        held.retain(|one| one.draft.status.is_in_use());
+        Ok(held)
     }
 
-    /// Puts a draft into the library, whose folder is made if it is the default.
+    /// Puts a draft into the library, whose folder is made if it is not there.
     ///
     /// # Errors
-    /// If the file is no draft, if the library has a draft of its name, or if the file cannot be written.
+    /// If the file is no draft, if the library has a draft or a file of its name, or if the file cannot be written.
     pub(crate) fn add(&self, file: &Path) -> anyhow::Result<Held> {
         let draft = draft_of(file)?;
         let name = draft.draft.name.clone();
-        if let Some(other) = self.read()?.into_iter().find(|other| other.draft.draft.name == name) {
+        let held = self.read()?.held;
+        if let Some(other) = held.iter().find(|other| other.draft.draft.name == name) {
             let problem = format!(
-                "the library has a draft {name:?} already: {}; rename that one with `tactus effects rename {name} NEW`, or retire it",
+                "the library has a draft {name:?} already: {}; give that one another name first: `tactus effects rename {name} NEW`",
                 other.path.display()
             );
             return Err(Failure::new(Exit::Usage, problem).into());
         }
         let folder =
             self.folder().ok_or_else(|| anyhow!("no folder for the library: name one with --library"))?;
+        let path = folder.join(format!("{name}.toml"));
+        if path.exists() {
+            let problem =
+                format!("{} is there already and is no draft {name:?}: move it away", path.display());
+            return Err(Failure::new(Exit::Usage, problem).into());
+        }
         fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
-        let held = Held { path: folder.join(format!("{name}.toml")), draft };
+        let held = Held { path, draft };
         held.write()?;
         Ok(held)
     }
 }
 
-fn read(folder: &Path) -> anyhow::Result<Vec<Held>> {
+fn read(folder: &Path) -> anyhow::Result<Library> {
     let entries = fs::read_dir(folder).with_context(|| format!("{} cannot be read", folder.display()))?;
     let mut paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, std::io::Error>>()?;
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
     paths.sort();
-    let mut held: Vec<Held> = Vec::new();
+    let mut library = Library::default();
     for path in paths {
-        let draft = draft_of(&path)?;
-        if let Some(other) = held.iter().find(|other| other.draft.draft.name == draft.draft.name) {
-            let problem = format!(
-                "{}: {} has a draft {:?}, too",
-                path.display(),
-                other.path.display(),
-                draft.draft.name
-            );
-            return Err(Failure::new(Exit::Usage, problem).into());
+        let of_name = |name: &str| library.held.iter().find(|other| other.draft.draft.name == name);
+        match parsed(&path) {
+            Err(problem) => library.refused.push(Refused { path, problem }),
+            Ok(draft) => match of_name(&draft.draft.name) {
+                Some(other) => {
+                    let name = &draft.draft.name;
+                    let problem = format!("{} has a draft {name:?}, too", other.path.display());
+                    library.refused.push(Refused { path, problem });
+                }
+                None => library.held.push(Held { path, draft }),
+            },
         }
-        held.push(Held { path, draft });
     }
-    Ok(held)
+    Ok(library)
 }
 
 fn draft_of(path: &Path) -> anyhow::Result<DraftFile> {
-    let text = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-    let refused = |error| Failure::new(Exit::Usage, format!("{}: {error}", path.display()));
-    Ok(DraftFile::from_toml(&text).map_err(refused)?)
+    let refused = |problem| Failure::new(Exit::Usage, format!("{}: {problem}", path.display()));
+    Ok(parsed(path).map_err(refused)?)
+}
+
+/// The draft of a file.
+///
+/// # Errors
+/// What is wrong, without the file's name.
+fn parsed(path: &Path) -> Result<DraftFile, String> {
+    let bytes = fs::read(path).map_err(|error| format!("cannot be read: {error}"))?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let intact = error.utf8_error().valid_up_to();
+        let line = 1 + String::from_utf8_lossy(&error.as_bytes()[..intact]).matches('\n').count();
+        format!("line {line}: no text (UTF-8)")
+    })?;
+    DraftFile::from_toml(&text).map_err(|error| error.to_string())
 }
 
 impl Held {
+    /// The draft as a report names it.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub(crate) fn for_report(&self) -> anyhow::Result<LabEffect> {
+        let name = self.draft.draft.name.clone();
+        Ok(LabEffect { name, status: self.draft.status, sha256: sha256::of_file(&self.path)? })
+    }
+
     /// Writes the draft, first beside its place, so that the file is never half of one.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! `simulate`: simulates what a sensor reads from a tool: an image, frames along a path, or live frames on the bus.
 
+mod drafts;
 mod live;
 mod picture;
 mod scene;
@@ -80,11 +81,18 @@ fn to_json(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by:
         "sigma_mm": scene.sigma_mm(),
         "noise": args.noise,
         "computed_by": computed_by,
+        "effects": drafts::effects(scene),
+        "notes": notes(scene, copies),
         "unit": "counts",
         "image": copies.first().map(|image| rows(array, image)),
         "copies": (copies.len() > 1).then(|| copies.iter().map(|image| rows(array, image)).collect::<Vec<_>>()),
         "out": args.out,
     })
+}
+
+/// Where the scene leaves what the model's drafts were drafted from.
+fn notes(scene: &Scene, copies: &[Vec<f64>]) -> Vec<String> {
+    copies.first().map_or_else(Vec::new, |counts| drafts::notes(scene, &scene.contact, counts))
 }
 
 fn print(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by: &str) -> anyhow::Result<()> {
@@ -97,6 +105,11 @@ fn print(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by: &
         ("tool", format!("at {x_mm:.2}, {y_mm:.2} mm, {rotation_deg} degrees, {depth_mm} mm deep")),
         ("covering", format!("{thickness_mm} mm, sigma {:.3} mm", scene.sigma_mm())),
     ];
+    let effects = drafts::effects(scene);
+    if !effects.is_empty() {
+        fields.push(("effects", effects.join(", ")));
+    }
+    fields.extend(notes(scene, copies).into_iter().map(|note| ("note", note)));
     if depth_mm > thickness_mm {
         let note = format!("deeper than the covering: what is below it presses as if {thickness_mm} mm deep");
         fields.push(("note", note));

@@ -1,14 +1,23 @@
 //! The grammar: which drafts there are.
 //!
 //! An atom is a carrier, when it acts, and one covariate or two. Not every carrier goes with every covariate: what would be the same to all
-//! data, or cannot be, is left out. None of them is modelled after a case of the evidence.
+//! data, or cannot be, is left out. None of them has the formula of a physics. But some are here because tuning sets with a certain physics
+//! outside the library were drafted wrongly without them, so their drafts of that physics are no independent evidence:
+//!
+//! | atom | added | after a miss of |
+//! |---|---|---|
+//! | a press at the tip's place by height, always | 2026-11-27 | `proximity`: felt from afar, it was `surface-offset` beside its draft (decision 0047) |
+//! | knots from frame to frame after an event | 2026-11-27 | no miss that the history tells; `ringing` is what they follow |
+//! | a jump, counts by the element's counts | 2026-11-28 | `range-switch`: drafted as a curve of the signal |
+//! | fine knots by height | 2026-11-28 | `adhesion`, and `proximity` with it: what is gone a little above the surface |
+//! | counts by the place, x and y, always | 2026-11-29 | `arm-shadow` |
 
 use std::sync::Arc;
 
 use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, When};
 
-use super::sight::{OF_ELEMENTS, Sight};
+use super::sight::{KNOTS_OF_ELEMENTS, Sight};
 use super::{KNOTS, KNOTS_OF_DISTANCE, KNOTS_OF_SECOND};
 use crate::fit::{Fitted, Problem};
 use crate::search::cells::Point;
@@ -202,7 +211,7 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
         (knots.len() > KNOTS).then(|| Atom::of(carrier, when, covariate, knots))
     };
     found.extend(of_all().filter(|(.., covariate)| is_near_an_event(*covariate)).filter_map(fine));
-    found.extend(each(OF_EACH).filter_map(|one| smooth(one, OF_ELEMENTS, true)));
+    found.extend(each(OF_EACH).filter_map(|one| smooth(one, KNOTS_OF_ELEMENTS, true)));
     found.extend(each(CONSTANT).flat_map(|(carrier, when, covariate)| {
         let place = sight.knots((carrier, when, covariate), 1);
         let constant = (!place.is_empty()).then(|| Atom::of(carrier, when, covariate, place));

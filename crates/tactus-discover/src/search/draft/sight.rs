@@ -17,7 +17,7 @@ const APART_SHARE: f64 = 0.01;
 /// Two fine knots are apart by this share of the value at least, and by a frame.
 const FINE_SHARE: f64 = 0.2;
 /// Knots of the curve from which weights of elements are found.
-const KNOTS_OF_ELEMENTS: usize = 3;
+pub(super) const KNOTS_OF_ELEMENTS: usize = 3;
 
 /// The data as a draft sees them, bin by bin.
 pub(super) struct Sight {
@@ -338,6 +338,3 @@ impl Atom {
         }
     }
 }
-
-/// Knots for the curve of weights.
-pub(super) const OF_ELEMENTS: usize = KNOTS_OF_ELEMENTS;

@@ -75,19 +75,23 @@ pub(super) fn sentence(draft: &Draft) -> String {
     let (scale, of) =
         if draft.carrier.unit() == "share" { (100.0, "%") } else { (1.0, draft.carrier.unit()) };
     if let Law::Linear { offset, slope: 0.0 } = &draft.law {
-        return format!("{}, {what}{own} that is constant: {} {of}", capital(when), number(scale * offset));
+        let [_, value] = numbers([0.0, scale * offset]);
+        return format!("{}, {what}{own} that is constant: {value} {of}", capital(when));
     }
+    let [least, most] = numbers([scale * least, scale * most]);
     format!(
-        "{}, {what}{own} that follows the {}, {how}: {} to {} {of}",
+        "{}, {what}{own} that follows the {}, {how}: {least} to {most} {of}",
         capital(when),
         names.join(" and the "),
-        number(scale * least),
-        number(scale * most),
     )
 }
 
+/// The unit of the first covariate. A draft sees signals before the sensitivity, which others see in counts.
 fn unit(draft: &Draft) -> &'static str {
-    draft.covariates.first().copied().map_or("", Covariate::unit)
+    match draft.covariates.first() {
+        Some(one) if one.needs_signals() && one.unit() == "mm" => "mm (times the sensitivity)",
+        one => one.copied().map_or("", Covariate::unit),
+    }
 }
 
 /// The least and the greatest value of a draft within the range of its data.
@@ -102,19 +106,18 @@ fn extent(draft: &Draft) -> [f64; 2] {
     [least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
 }
 
-/// With three digits.
-fn number(value: f64) -> String {
-    let digits = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
-    let places = (2.0 - digits).clamp(0.0, 6.0);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 6")]
-    let places = places as usize;
-    let told = format!("{value:.places$}");
-    // A law that begins at 0 may end up a hair below it.
-    if told.trim_start_matches('-').chars().all(|letter| matches!(letter, '0' | '.')) {
-        "0".into()
-    } else {
-        told
-    }
+/// Both ends of a range with the same decimals: the larger one has three digits.
+fn numbers(range: [f64; 2]) -> [String; 2] {
+    let larger = range[0].abs().max(range[1].abs());
+    let digits = if larger > 0.0 { larger.log10().floor() } else { 0.0 };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 9")]
+    let places = (2.0 - digits).clamp(0.0, 9.0) as usize;
+    range.map(|end| {
+        let told = format!("{end:.places$}");
+        // A law that begins at 0 may end up a hair beside it.
+        let is_zero = told.trim_start_matches('-').chars().all(|letter| matches!(letter, '0' | '.'));
+        if is_zero { "0".into() } else { told }
+    })
 }
 
 fn capital(words: &str) -> String {

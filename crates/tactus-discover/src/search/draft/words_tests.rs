@@ -17,8 +17,8 @@ fn a_draft_is_told_in_one_sentence() {
     };
     assert_eq!(
         sentence(&draft),
-        "While the tool touches, the signal changes by a share that follows the sum of signals, levelling off with a length of 1.000 mm: \
-         -19.6 to 0 %"
+        "While the tool touches, the signal changes by a share that follows the sum of signals, levelling off with a length of 1.000 mm \
+         (times the sensitivity): -19.6 to 0 %"
     );
     let grounded = Draft {
         carrier: Carrier::Counts,
@@ -32,4 +32,25 @@ fn a_draft_is_told_in_one_sentence() {
         sentence(&grounded),
         "While the tool touches, counts are added, a number, with a weight for each element, that is constant: 5.00 counts"
     );
+}
+
+#[test]
+fn both_ends_of_a_range_have_the_same_decimals_and_a_hair_beside_zero_is_zero() {
+    let power = |scale: f64| Draft {
+        name: "draft-1".into(),
+        sentence: String::new(),
+        carrier: Carrier::OwnSignal,
+        when: When::InContact,
+        covariates: vec![Covariate::Depth],
+        ranges: vec![[0.001, 7.0]],
+        law: Law::Power { scale, exponent: 2.0 },
+        weights: None,
+    };
+    for (scale, told) in [(-0.00365, ": -17.9 to 0 %"), (0.022_9, ": 0 to 112 %")] {
+        let said = sentence(&power(scale));
+        assert!(said.ends_with(told), "{said}");
+    }
+    let linear =
+        Draft { law: Law::Linear { offset: 0.085, slope: 0.01 }, ranges: vec![[0.0, 7.5]], ..power(1.0) };
+    assert!(sentence(&linear).ends_with(": 8.5 to 16.0 %"), "{}", sentence(&linear));
 }

@@ -259,7 +259,7 @@ pub(crate) fn unexplained() -> Discovery {
             level: whole.base,
             closed: Some(Closed { share: 0.0, standard_error: None, most: f64::INFINITY }),
         },
-        rounds: vec![Round { taken: None, ..whole.rounds[0].clone() }],
+        rounds: vec![Round { with: vec![], taken: None, ..whole.rounds[0].clone() }],
         steps: vec![],
         tentative: vec![],
         inclusions: vec![],

@@ -4,16 +4,18 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use tactus_discover::{Discovery, NextExperiment, Verdict};
-use tactus_model::effect::Definition;
+use tactus_model::effect::{Definition, EffectError};
 use tactus_report::discovery::{ActiveRun, AmbiguousEffect, command, nothing_open, open};
 use tactus_runner::config;
 use tactus_runner::embedded::SIMULATED_RIG;
-use tactus_schema::Rig;
+use tactus_schema::draft::DraftStatus;
 use tactus_schema::pb::ExitStatus;
+use tactus_schema::{DraftFile, Rig};
 
 use super::settled::{self, Settled};
 use super::{Discovered, LiveRig};
 use crate::cli::{Common, DiscoverArgs, ExperimentArgs, LeaseArgs, RunArgs, RunSubject};
+use crate::commands::library::Held;
 use crate::commands::run::{RunSummary, execute_part};
 use crate::connection;
 use crate::exit::{Exit, Failure};
@@ -42,9 +44,11 @@ struct ChosenExperiment {
     expected_z: Option<f64>,
 }
 
+/// Discovers with experiments, and with the drafts of the lab's library that are in use.
 pub(super) fn discover(
     common: &Common,
     args: &DiscoverArgs,
+    library: &[Held],
     analyse: impl Fn(&[PathBuf], Option<&LiveRig>, &[&'static Definition]) -> anyhow::Result<Discovered>,
 ) -> anyhow::Result<Discovered> {
     let mut runner = ExperimentRunner::find(common, args)?;
@@ -54,12 +58,13 @@ pub(super) fn discover(
             runner.run(&ChosenExperiment::diagnose((runner.budget_s / 2.0 / DIAGNOSE_S).min(1.0)))?.recording,
         );
     }
-    let mut discovered = analyse(&files, Some(&runner.live), &[])?;
+    let mut drafts = Drafts::of(library)?;
+    let mut discovered = analyse(&files, Some(&runner.live), &drafts.in_use)?;
     let mut active: Vec<ActiveRun> = Vec::new();
-    let mut settled: Vec<Settled> = Vec::new();
     let mut active_ended = None;
     for nth in 1..=args.rounds {
-        let chosen = match choose(&discovered.discovery, runner.budget_s, &active) {
+        let unconfirmed = drafts.unconfirmed(&discovered.discovery);
+        let chosen = match choose(&discovered.discovery, &unconfirmed, runner.budget_s, &active) {
             Ok(chosen) => chosen,
             Err(why) => {
                 let why = format!("Round {nth} of {} runs nothing: {why}.", args.rounds);
@@ -86,40 +91,98 @@ pub(super) fn discover(
             files.push(summary.recording);
         }
         let new = &files[files.len() - round.len()..];
-        if let Some(one) = settled::settle(&discovered, new)? {
+        for one in settled::settle(&discovered, &unconfirmed, new)? {
             runner.say(&one.in_words);
-            settled.push(one);
+            drafts.take(one)?;
         }
-        let holding: Vec<&'static Definition> = settled.iter().filter_map(|one| one.holding).collect();
-        discovered = analyse(&files, Some(&runner.live), &holding)?;
+        discovered = analyse(&files, Some(&runner.live), &drafts.in_use)?;
+        settled::renumber(&mut discovered.discovery, &drafts.refuted, &drafts.in_use)?;
         let after = undecided(&discovered.discovery);
         active.extend(round.into_iter().map(|run| ActiveRun { after: after.clone(), ..run }));
     }
-    let (files, in_words) = settled.into_iter().map(|one| (one.file, one.in_words)).unzip();
-    Ok(Discovered { active, active_ended, settled: files, settled_in_words: in_words, ..discovered })
+    let Drafts { settled, remeasured, settled_in_words, .. } = drafts;
+    Ok(Discovered { active, active_ended, settled, remeasured, settled_in_words, ..discovered })
 }
 
-/// The best affordable experiment for each undecided pair; `diagnose` if there is none and something is unexplained.
+/// The drafts of a discovery with experiments.
+struct Drafts<'a> {
+    library: &'a [Held],
+    /// Those that an analysis tries.
+    in_use: Vec<&'static Definition>,
+    /// Names of those that experiments have refuted.
+    refuted: Vec<String>,
+    /// Drafts of this discovery of which experiments have told.
+    settled: Vec<DraftFile>,
+    /// The same of the library.
+    remeasured: Vec<Held>,
+    settled_in_words: Vec<String>,
+}
+
+impl<'a> Drafts<'a> {
+    fn of(library: &'a [Held]) -> anyhow::Result<Self> {
+        let in_use = library.iter().map(|one| one.draft.define()).collect::<Result<_, _>>()?;
+        Ok(Self {
+            library,
+            in_use,
+            refuted: Vec::new(),
+            settled: Vec::new(),
+            remeasured: Vec::new(),
+            settled_in_words: Vec::new(),
+        })
+    }
+
+    /// Those of the library that a discovery names and no measurement has confirmed yet.
+    fn unconfirmed(&self, found: &Discovery) -> Vec<&'a Held> {
+        let is_named = |one: &&Held| found.steps.iter().any(|step| step.effect == one.draft.draft.name);
+        let is_open = |one: &&Held| {
+            one.draft.status.is_open() && self.remeasured.iter().all(|other| other.path != one.path)
+        };
+        self.library.iter().filter(is_named).filter(is_open).collect()
+    }
+
+    /// Takes what an experiment tells of a draft.
+    fn take(&mut self, told: Settled) -> Result<(), EffectError> {
+        self.settled_in_words.push(told.in_words);
+        let Some(file) = told.file else { return Ok(()) };
+        let name = &file.draft.name;
+        if file.status == DraftStatus::Refuted {
+            self.in_use.retain(|one| one.name != name);
+            self.refuted.push(name.clone());
+        } else if told.held_at.is_none() {
+            self.in_use.push(file.define()?);
+        }
+        match told.held_at {
+            Some(path) => self.remeasured.push(Held { path, draft: file }),
+            None => self.settled.push(file),
+        }
+        Ok(())
+    }
+}
+
+/// The best affordable experiment for each undecided pair; `diagnose` if there is none and a draft of the library is unconfirmed or something is
+/// unexplained.
 ///
 /// # Errors
 /// Why there is nothing to run.
-fn choose(found: &Discovery, budget_s: f64, done: &[ActiveRun]) -> Result<Vec<ChosenExperiment>, String> {
+fn choose(
+    found: &Discovery,
+    unconfirmed: &[&Held],
+    budget_s: f64,
+    done: &[ActiveRun],
+) -> Result<Vec<ChosenExperiment>, String> {
     let mut chosen: Vec<ChosenExperiment> = Vec::new();
     let undecided = found.plan.open.iter().filter(|one| one.separates[1] != "nothing");
     let mut reasons: Vec<String> = undecided.map(|one| lowered(&open(one))).collect();
     let mut left_s = budget_s;
     let mut answered: Vec<&[String; 2]> = Vec::new();
-    let is_done = |one: &ChosenExperiment| {
-        done.iter().any(|run| run.experiment == one.experiment && run.parameters == one.parameters)
-    };
     for next in found.plan.next.iter().filter(|next| next.separates[1] != "nothing") {
-        let one = ChosenExperiment::of(next);
+        let one = ChosenExperiment::of(next, done);
         if answered.contains(&&next.separates) {
             continue;
         }
         if chosen.iter().any(|other| other.is_same(&one)) {
             answered.push(&next.separates);
-        } else if is_done(&one) {
+        } else if one.is_done(done) {
             reasons.push(format!("`{}` was run already", one.command()));
         } else if one.duration_s > left_s {
             reasons.push(format!(
@@ -140,19 +203,40 @@ fn choose(found: &Discovery, budget_s: f64, done: &[ActiveRun]) -> Result<Vec<Ch
     if reasons.is_empty() {
         reasons.push(nothing_open(found).to_owned());
     }
-    if matches!(found.verdict, Verdict::CannotJudge | Verdict::Unexplained | Verdict::PartlyExplained) {
-        let scale = (budget_s / DIAGNOSE_S).min(1.0);
-        let one = ChosenExperiment::diagnose((100.0 * scale).floor() / 100.0);
-        if done.iter().any(|run| run.experiment == one.experiment) {
-            reasons.push("`tactus run diagnose` was run already".to_owned());
-        } else if scale < DIAGNOSE_SCALE_LEAST {
-            reasons
-                .push(format!("the budget of {} is too short for `tactus run diagnose`", duration(budget_s)));
+    if let Some(one) = diagnosis(found, unconfirmed, budget_s, done) {
+        let command = command(&one.experiment, &[]);
+        if one.duration_s < DIAGNOSE_SCALE_LEAST * DIAGNOSE_S {
+            reasons.push(format!("the budget of {} is too short for `{command}`", duration(budget_s)));
+        } else if one.is_done(done) {
+            reasons.push(format!("`{}` was run already", one.command()));
         } else {
             return Ok(vec![one]);
         }
     }
     Err(reasons.join("; "))
+}
+
+/// The `diagnose` that measures a draft of the library anew, or what is unexplained, as long as the budget allows.
+fn diagnosis(
+    found: &Discovery,
+    unconfirmed: &[&Held],
+    budget_s: f64,
+    done: &[ActiveRun],
+) -> Option<ChosenExperiment> {
+    let affordable = |most: f64| (100.0 * (budget_s / DIAGNOSE_S).min(most)).floor() / 100.0;
+    if let Some(draft) = unconfirmed.first() {
+        // The data that are there may be of the seed of the discovery.
+        let seed = found.seed.wrapping_add(ANEW_SEED).wrapping_add(done.len() as u64);
+        let separates = [draft.draft.draft.name.clone(), NOISE.into()];
+        return Some(ChosenExperiment {
+            separates,
+            seed: Some(seed),
+            ..ChosenExperiment::diagnose(affordable(ANEW_SCALE))
+        });
+    }
+    let is_open =
+        matches!(found.verdict, Verdict::CannotJudge | Verdict::Unexplained | Verdict::PartlyExplained);
+    is_open.then(|| ChosenExperiment::diagnose(affordable(1.0)))
 }
 
 /// A sentence as part of another one.
@@ -164,15 +248,31 @@ fn lowered(sentence: &str) -> String {
 /// Least `scale` of a `diagnose` that is worth its time.
 const DIAGNOSE_SCALE_LEAST: f64 = 0.1;
 
+/// The `scale` of a `diagnose` that measures a draft of the library anew.
+const ANEW_SCALE: f64 = 0.3;
+
+/// Makes another seed of that of a discovery.
+const ANEW_SEED: u64 = 0x5eed;
+
+/// What a plan distinguishes a draft from.
+const NOISE: &str = "noise";
+
+/// What a `diagnose` looks for if nothing is named.
+const MISSING: &str = "what is missing";
+
 /// Approximate duration of `diagnose` at scale 1.
 const DIAGNOSE_S: f64 = 1100.0;
 
 impl ChosenExperiment {
-    fn of(next: &NextExperiment) -> Self {
+    /// An experiment of a plan; one that was run before has another seed.
+    fn of(next: &NextExperiment, done: &[ActiveRun]) -> Self {
+        let is_same =
+            |run: &&ActiveRun| run.experiment == next.experiment && run.parameters == next.parameters;
+        let times = done.iter().filter(is_same).count() as u64;
         Self {
             experiment: next.experiment.clone(),
             parameters: next.parameters.clone(),
-            seed: Some(next.seed),
+            seed: Some(next.seed.wrapping_add(times)),
             duration_s: next.duration_s,
             separates: next.separates.clone(),
             expected_z: next.expected_z,
@@ -186,13 +286,23 @@ impl ChosenExperiment {
             parameters,
             seed: None,
             duration_s: scale * DIAGNOSE_S,
-            separates: ["what is missing".into(), "noise".into()],
+            separates: [MISSING.into(), NOISE.into()],
             expected_z: None,
         }
     }
 
     fn is_same(&self, other: &Self) -> bool {
         self.experiment == other.experiment && self.parameters == other.parameters
+    }
+
+    /// True if it was run before for the same question. A draft needs a run that it was not drafted from, so each draft is a question of its own.
+    fn is_done(&self, done: &[ActiveRun]) -> bool {
+        let is_of_draft = self.separates[1] == NOISE && self.separates[0] != MISSING;
+        done.iter().any(|run| {
+            run.experiment == self.experiment
+                && run.parameters == self.parameters
+                && (!is_of_draft || run.separates == self.separates)
+        })
     }
 
     fn command(&self) -> String {

@@ -1,12 +1,13 @@
 //! Terminal output of a discovery.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tactus_calibrate::Estimate;
-use tactus_discover::{AddedEffect, DraftedEffect, Estimated, FittedCurve, Level};
+use tactus_discover::{AddedEffect, Discovery, DraftedEffect, Estimated, FittedCurve, Level};
+use tactus_model::effect::Definition;
 use tactus_report::discovery::{
-    AmbiguousEffect, DiscoveryReport, Proposal, closed, command, draft_status, in_words, not_proposed,
-    not_shown, proposals,
+    AmbiguousEffect, DiscoveryReport, Proposal, closed, command, definition, draft_status, flags, in_words,
+    not_proposed, not_shown, proposals,
 };
 
 use crate::commands::calibrate::{estimate, faulty};
@@ -41,6 +42,9 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
         say("");
         let rows: Vec<Vec<String>> = found.steps.iter().flat_map(step).collect();
         print_table(&["added", "parameters", "held-out counts rms", "q", "indistinguishable from"], &rows);
+        for sentence in found.steps.iter().flat_map(|step| about(found, step)) {
+            say(&sentence);
+        }
     }
     say("");
     say(&in_words(found));
@@ -66,11 +70,25 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
         say(&path.display().to_string());
     }
     let file = |name: &str| paths.iter().find(|path| path.ends_with(name));
-    if let Some(draft) = file("draft-1.toml") {
+    if let Some(Ok(drafted)) = &found.draft {
+        let draft = &drafted.draft;
+        let path =
+            file(&format!("{}.toml", draft.name)).map_or_else(String::new, |path| path.display().to_string());
+        say_next(&format!(
+            "`tactus discover FILES --active` measures {} anew, then `tactus effects add {path}`",
+            draft.name
+        ));
+    } else if let Some(draft) = paths.iter().find(|path| holds(path)) {
         say_next(&format!("`tactus effects add {}` lets every discovery try the draft", draft.display()));
     } else if let Some(model) = file("model.toml") {
         say_next(&format!("`tactus simulate --model {}` shows an image of this sensor", model.display()));
     }
+}
+
+/// True of the file of a draft that was not refuted.
+fn holds(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with("draft-") && !name.ends_with("-refuted.toml")
 }
 
 fn facts(report: &DiscoveryReport<'_>) {
@@ -145,6 +163,13 @@ fn step(step: &AddedEffect) -> Vec<Vec<String>> {
         ]
     });
     rows.collect()
+}
+
+/// What stands under the table of an added effect: a draft's sentence, and the parameters that are not to be trusted.
+fn about(found: &Discovery, step: &AddedEffect) -> Vec<String> {
+    let draft = definition(found, step).and_then(Definition::draft);
+    let sentence = draft.map(|draft| format!("{}.", draft.sentence));
+    sentence.into_iter().chain(flags(found, step)).map(|said| format!("{}: {said}", step.effect)).collect()
 }
 
 /// The parameters of a term; only the first of a long curve.

@@ -1,4 +1,8 @@
+use tactus_model::effect::{Carrier, Draft, Law, When};
+use tactus_model::{Covariate, Effect};
+
 use super::*;
+use crate::commands::discover::model::tests::{before, found};
 
 #[test]
 fn a_line_names_curves_and_tables_beside_the_parameters() {
@@ -22,4 +26,31 @@ fn a_number_without_an_error_is_short() {
     for (value, words) in cases {
         assert_eq!(four_digits(value), words);
     }
+}
+
+#[test]
+fn under_the_added_effects_stand_a_drafts_sentence_and_parameters_not_to_be_trusted() {
+    let mut discovery = found(&before());
+    assert_eq!(about(&discovery, &discovery.steps[0]), Vec::<String>::new());
+    discovery.steps[0].terms[0][3].standard_error = Some(0.95);
+    assert_eq!(
+        about(&discovery, &discovery.steps[0]),
+        [
+            "miswired: other_share has a standard error greater than its value: these data hardly determine it."
+        ]
+    );
+    let draft = Draft {
+        name: "draft-1".into(),
+        sentence: "While the tool touches, counts are added".into(),
+        carrier: Carrier::Counts,
+        when: When::InContact,
+        covariates: vec![Covariate::Depth],
+        ranges: vec![[0.0, 0.6]],
+        law: Law::Linear { offset: 5.0, slope: 1.0 },
+        weights: None,
+    };
+    let definition = draft.define().unwrap();
+    discovery.effects.push(Effect::neutral(definition));
+    let step = AddedEffect { effect: definition.name, terms: Vec::new(), ..discovery.steps[0].clone() };
+    assert_eq!(about(&discovery, &step), ["draft-1: While the tool touches, counts are added."]);
 }

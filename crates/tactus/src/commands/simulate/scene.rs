@@ -11,6 +11,7 @@ use tactus_scene::{GpuRenderer, Pose, Renderer};
 use tactus_schema::model::Model;
 
 use crate::cli::SimulateArgs;
+use crate::commands::discover::no_model;
 use crate::exit::{Exit, Failure, in_words};
 
 /// The characterisation of the paper's sensor.
@@ -104,8 +105,9 @@ fn model(args: &SimulateArgs) -> anyhow::Result<Model> {
     if let Some(path) = &args.model {
         let text =
             std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-        let model = Model::from_toml(&text)
-            .map_err(|error| Failure::new(Exit::Usage, format!("{}: {error}", path.display())))?;
+        let model = Model::from_toml(&text).map_err(|error| {
+            Failure::new(Exit::Usage, format!("{}: {}", path.display(), no_model(&text, &error)))
+        })?;
         return Ok(match array {
             Some(array) if array != model.base.array => model.on(array),
             _ => model,

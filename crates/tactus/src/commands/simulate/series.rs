@@ -9,8 +9,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde_json::json;
-use tactus_model::{Simulator, Trajectory};
+use tactus_model::{Contact, Simulator, Trajectory};
 
+use super::drafts;
 use super::scene::Scene;
 use crate::cli::{Common, SimulateArgs};
 use crate::exit::{Exit, Failure, in_words};
@@ -51,10 +52,15 @@ pub(super) fn write(
     }
     // A terminal that gets the frames shows how far they are.
     let busy = Busy::with("simulating", common.json || args.out.is_none());
+    let mut deepest: Option<(Contact, Vec<f64>)> = None;
     for (done, image) in images.enumerate() {
         busy.shows(done as f64 / f64::from(frames));
         let [x_mm, y_mm, z_mm] = trajectory.at(image.t_s);
         let counts = if args.noise { image.counts } else { image.clean_counts };
+        if deepest.as_ref().is_none_or(|(contact, _)| -z_mm > contact.depth_mm) {
+            let contact = Contact { position_mm: [x_mm, y_mm], depth_mm: -z_mm, ..scene.contact.clone() };
+            deepest = Some((contact, counts.clone()));
+        }
         if common.json {
             let line = json!({
                 "t_s": image.t_s, "x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm, "counts": counts, "simulated": true,
@@ -67,6 +73,10 @@ pub(super) fn write(
     }
     out.flush()?;
     drop(busy);
+    let notes = deepest.map_or_else(Vec::new, |(contact, counts)| drafts::notes(scene, &contact, &counts));
+    for note in notes {
+        eprintln!("note: where the tip is deepest: {note}");
+    }
     if let Some(path) = &args.out {
         eprintln!("{frames} frames of the simulated sensor in {}", path.display());
     }
