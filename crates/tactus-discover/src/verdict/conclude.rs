@@ -39,8 +39,8 @@ pub(crate) struct SearchOutcome {
 }
 
 /// Said where the search ended at its bound.
-const ENDED_EARLY: &str = "no class leaves little, and the search has done as much as it may: classes that it did not try beside \
-                           those in the report may be missing";
+const ENDED_EARLY: &str = "every effect leaves much, and the search was stopped at its bound: some combinations of effects were \
+                           not tried";
 
 /// Judges the outcome of a search and builds the report.
 pub(crate) fn conclude(
@@ -253,7 +253,7 @@ pub(super) fn misread(
         terms: parameters.iter().map(|of_one| of_one.iter().map(estimated).collect()).collect(),
         p_value,
         q_value: p_value,
-        folds_p_value: p_value,
+        folds_p_value: Some(p_value),
         // It does not change a mean.
         heldout_rms_before_counts: heldout_rms_counts,
         heldout_rms_after_counts: heldout_rms_counts,

@@ -43,9 +43,8 @@ pub(crate) struct Step {
 
 impl Step {
     fn is_confirmed(&self) -> bool {
-        let p_value = self.added.folds_p_value;
         // What folds cannot tell is confirmed by its odds alone.
-        p_value.is_nan() || p_value <= CONFIRMED_P.max(AGREED * self.least_p)
+        self.added.folds_p_value.is_none_or(|p_value| p_value <= CONFIRMED_P.max(AGREED * self.least_p))
     }
 }
 
@@ -65,7 +64,10 @@ pub(crate) fn confirmed(
         !names.contains(&step.added.effect) || step.added.effect == MISWIRED || step.is_confirmed()
     };
     let (steps, tentative): (Vec<Step>, Vec<Step>) = steps.into_iter().partition(is_firm);
-    let few = |step: &&Step| names.contains(&step.added.effect) && step.added.folds_p_value > CONFIRMED_P;
+    let few = |step: &&Step| {
+        names.contains(&step.added.effect)
+            && step.added.folds_p_value.is_some_and(|p_value| p_value > CONFIRMED_P)
+    };
     let agreed = steps.iter().filter(few).map(|step| step.added.effect).collect();
     let all = Confirmed { grown, steps: added(steps), tentative: Vec::new(), agreed, refuted };
     if tentative.is_empty() {
@@ -181,9 +183,7 @@ impl Search<'_> {
                 terms: terms.filter(|(term, _)| term.definition.name == name).map(estimated).collect(),
                 p_value,
                 q_value: p_value,
-                // Beside a random walk it is not tested, and so no number: a report has none.
-                folds_p_value: by_folds
-                    .map_or(f64::NAN, |gains| sign_flip_p(&gains, FLIPS, self.options.seed)),
+                folds_p_value: by_folds.map(|gains| sign_flip_p(&gains, FLIPS, self.options.seed)),
                 heldout_rms_before_counts: problem.heldout_rms_counts(&before.predicted),
                 heldout_rms_after_counts: problem.heldout_rms_counts(&grown.predicted),
                 curves,

@@ -153,8 +153,9 @@ pub struct AddedEffect {
     pub p_value: f64,
     /// p-value, adjusted for the false-discovery rate over all added effects.
     pub q_value: f64,
-    /// The same probability on fitted presses, each predicted by a fit to others (five folds). It decides whether the effect is confirmed.
-    pub folds_p_value: f64,
+    /// The same probability on fitted presses, each predicted by a fit to others (five folds). It decides whether the effect is confirmed. `None`
+    /// beside a random walk, which folds do not tell: its odds alone decide then.
+    pub folds_p_value: Option<f64>,
     /// Root mean square of the held-out residuals of the grown model without this effect, refitted.
     pub heldout_rms_before_counts: f64,
     /// The same for the whole grown model.

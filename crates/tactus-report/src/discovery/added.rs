@@ -104,11 +104,11 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect, report: &DiscoveryReport
 }
 
 /// What fitted presses say that the fit has not seen.
-fn by_folds(p_value: f64) -> String {
-    if p_value.is_nan() {
+fn by_folds(p_value: Option<f64>) -> String {
+    let Some(p_value) = p_value else {
         return "On fitted presses it is not tested: beside a random walk none is predicted by a fit to others. Its odds alone confirm it."
             .into();
-    }
+    };
     format!(
         "On fitted presses, each predicted by a fit to others, it is {}: this decides whether the effect is confirmed.",
         words::probability(p_value)

@@ -226,7 +226,7 @@ struct StepJson<'a> {
     p_value: f64,
     q_value: f64,
     /// Null if it was not tested.
-    folds_p_value: f64,
+    folds_p_value: Option<f64>,
     heldout_rms_before: f64,
     heldout_rms_after: f64,
     /// `formula`, `knots`, or `table` if only parameters are free.

@@ -701,7 +701,7 @@ fn an_added_draft_keeps_its_sentence_its_curve_and_its_facts() {
 #[test]
 fn what_the_folds_of_presses_do_not_test_has_no_probability() {
     let mut discovery = explained();
-    discovery.steps[0].folds_p_value = f64::NAN;
+    discovery.steps[0].folds_p_value = None;
     assert_eq!(json(&discovery)["steps"][0]["folds_p_value"], Value::Null);
     let page = html(&discovery);
     assert!(page.contains("On fitted presses it is not tested: beside a random walk"));

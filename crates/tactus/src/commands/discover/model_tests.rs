@@ -82,7 +82,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
             terms: vec![term(miswired(18.0, 19.0)), term(miswired(19.0, 18.0))],
             p_value: 1e-5,
             q_value: 1e-4,
-            folds_p_value: 1e-4,
+            folds_p_value: Some(1e-4),
             heldout_rms_before_counts: 8.0,
             heldout_rms_after_counts: 2.0,
             curves: Vec::new(),

@@ -100,7 +100,9 @@ fn show_draft(one: &Held, figure: Option<&Path>) {
         ("depends on", covariates(draft).join("; ")),
         ("law", law(draft)),
     ];
-    let nearest = nearest.iter().map(|one| format!("{} ({:.0} behind)", one.class, one.ln_odds_behind));
+    let nearest = nearest
+        .iter()
+        .map(|one| format!("{} (by {:.0} in the logarithm of the odds)", one.class, one.ln_odds_behind));
     fields.push(("nearest", nearest.collect::<Vec<_>>().join(", ")));
     let closes = |share: &Option<f64>| {
         share.map_or_else(|| "nothing was left".to_owned(), |share| format!("closes {:.0} %", 100.0 * share))
