@@ -87,9 +87,9 @@ impl Live {
             let problem = match Client::connect(&self.service.endpoint(), self.service.rig.as_deref()).await {
                 Ok(client) => {
                     let client = Arc::new(client);
-                    info!(rig = client.rig(), "connected");
                     self.feed().board.connected(client.rig());
                     to_client.send_replace(Some(Arc::clone(&client)));
+                    info!(rig = client.rig(), "connected");
                     let ended = self.follow(&client).await;
                     let problem = ended.map_or_else(
                         |error| error.to_string(),
