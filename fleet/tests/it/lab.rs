@@ -65,19 +65,14 @@ impl Lab {
         presses: usize,
         gain: f64,
     ) -> PathBuf {
-        self.record_with_rises(rig, run_id, started_ns, presses, |rise| gain * rise)
+        let plan = Plan { run_id: run_id.to_owned(), ..Plan::short(presses) };
+        self.record_plan(rig, plan, started_ns, gain)
     }
 
-    /// The same with a sensor that shows another rise for each, in counts.
-    pub(crate) fn record_with_rises(
-        &self,
-        rig: &str,
-        run_id: &str,
-        started_ns: i64,
-        presses: usize,
-        shown: impl Fn(f64) -> f64,
-    ) -> PathBuf {
-        let mut run = Plan { run_id: run_id.to_owned(), ..Plan::short(presses) }.make();
+    /// Records a run as planned, with a sensor whose rises are multiplied.
+    pub(crate) fn record_plan(&self, rig: &str, plan: Plan, started_ns: i64, gain: f64) -> PathBuf {
+        let mut run = plan.make();
+        let run_id = &run.plan.run_id.clone();
         rig.clone_into(&mut run.rig.name);
         let path = self.path(&format!("runs/{run_id}/recording.mcap"));
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -99,7 +94,7 @@ impl Lab {
         let mut recording = Recording::create(&path, &header).unwrap();
         for fed in &mut run.fed {
             match fed {
-                Fed::Frame(frame) => frame.counts = with_rises(&frame.counts, &shown),
+                Fed::Frame(frame) => frame.counts = amplified(&frame.counts, gain),
                 Fed::Info(info, _) => rig.clone_into(&mut info.rig),
                 Fed::Stage(_) | Fed::Event(_) => {}
             }
@@ -138,10 +133,10 @@ impl Lab {
     }
 }
 
-/// Counts with other rises above the baseline of 100.
-fn with_rises(counts: &[f32], shown: impl Fn(f64) -> f64) -> Arc<[f32]> {
+/// Counts whose rises above the baseline of 100 are multiplied.
+fn amplified(counts: &[f32], gain: f64) -> Arc<[f32]> {
     #[expect(clippy::cast_possible_truncation, reason = "counts are of single precision")]
-    counts.iter().map(|counts| (100.0 + shown(f64::from(*counts) - 100.0)) as f32).collect()
+    counts.iter().map(|counts| (100.0 + gain * (f64::from(*counts) - 100.0)) as f32).collect()
 }
 
 fn collect(root: &Path, folder: &Path, files: &mut Vec<String>) {
