@@ -5,7 +5,9 @@ use std::fmt;
 
 use anyhow::Result;
 use serde::Deserialize;
-use tactus_discover::constants::{FORM_SHARE, LEFT_SHARE, MISFIT_SHARE, NEAR_CLOSES, SET_PROBABILITY};
+use tactus_discover::constants::{
+    DRIFTS, FORM_SHARE, LEFT_SHARE, MISFIT_SHARE, NEAR_CLOSES, SET_PROBABILITY,
+};
 use tactus_sets::Label;
 
 use super::campaign::{Campaign, Planned};
@@ -22,8 +24,6 @@ const FORM_SHARES: [f64; 6] = [0.01, 0.02, 0.05, FORM_SHARE, 0.1, 0.2];
 const LEADS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 /// Values of the share of a gap that an effect closes of its own physics.
 const CLOSED_SHARES: [f64; 7] = [0.5, 0.7, 0.8, NEAR_CLOSES, 0.9, 0.95, 0.98];
-/// Effects beside which no share is asked.
-const DRIFTS: [&str; 2] = ["baseline-drift", "gain-drift"];
 
 /// A place in a grown model: the named class and those that were fitted in its place.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,6 +11,7 @@ use zenoh::{Session, pubsub::Subscriber, sample::Sample};
 use crate::{
     BusError, Published,
     liveness::Trust,
+    subscription::{read, sender},
     topic::{encoding, heard},
 };
 
@@ -45,16 +46,14 @@ impl Listener {
         let counted = Arc::clone(&passed_over);
         let expected = encoding(M::NAME);
         let take = move |sample: Sample| {
-            let source = sample.source_info().map(|source| source.source_id().zid());
-            if source.is_none_or(|source| trust.has(&source) != Some(true)) {
+            if sender(&sample).is_none_or(|sender| trust.has(&sender) != Some(true)) {
                 return counted.foreign.count();
             }
-            let message = (*sample.encoding() == expected).then(|| M::decode(&*sample.payload().to_bytes()));
-            if let Some(Ok(message)) = message {
-                hear(message);
-            } else {
-                tracing::debug!(key = %sample.key_expr(), encoding = %sample.encoding(), "unreadable message");
-                counted.unreadable.fetch_add(1, Ordering::Relaxed);
+            match read(&sample, &expected) {
+                Some(message) => hear(message),
+                None => {
+                    counted.unreadable.fetch_add(1, Ordering::Relaxed);
+                }
             }
         };
         let subscriber =

@@ -15,7 +15,7 @@ use zenoh::{
     bytes::Encoding,
     query::{ConsolidationMode, QueryTarget, ReplyKeyExpr},
     sample::Sample,
-    session::EntityGlobalId,
+    session::{EntityGlobalId, ZenohId},
 };
 use zenoh_ext::{AdvancedSubscriber, AdvancedSubscriberBuilderExt, RecoveryConfig};
 
@@ -178,12 +178,9 @@ impl<M: Published> Subscription<M> {
         loop {
             let sample = self.next_of_service().await?;
             self.count(&sample);
-            if *sample.encoding() == self.expected
-                && let Ok(message) = M::decode(&*sample.payload().to_bytes())
-            {
+            if let Some(message) = read(&sample, &self.expected) {
                 return Some(message);
             }
-            tracing::debug!(key = %sample.key_expr(), encoding = %sample.encoding(), "unreadable message");
             self.unreadable += 1;
         }
     }
@@ -195,7 +192,7 @@ impl<M: Published> Subscription<M> {
                 Some(sample) => sample,
                 None => self.reception.arrived.pop().await?,
             };
-            let source = sample.source_info().map(|source| source.source_id().zid());
+            let source = sender(&sample);
             self.undecided = Some(sample);
             // A service that has just come back may be heard before it has announced itself.
             let is_own = match source {
@@ -292,6 +289,21 @@ fn numbered(sample: Sample) -> Numbered<EntityGlobalId, Sample> {
     Numbered { origin: origin(&sample), item: sample }
 }
 
+/// The session that sent a message.
+pub(crate) fn sender(sample: &Sample) -> Option<ZenohId> {
+    origin(sample).map(|(publisher, _)| publisher.zid())
+}
+
+/// A sample of this encoding as the message that it is; `None` if it is none.
+pub(crate) fn read<M: Published>(sample: &Sample, expected: &Encoding) -> Option<M> {
+    let message =
+        (sample.encoding() == expected).then(|| M::decode(&*sample.payload().to_bytes()).ok()).flatten();
+    if message.is_none() {
+        tracing::debug!(key = %sample.key_expr(), encoding = %sample.encoding(), "unreadable message");
+    }
+    message
+}
+
 /// Who sent a message, and its number.
 fn origin(sample: &Sample) -> Option<(EntityGlobalId, u32)> {
     sample.source_info().map(|source| (*source.source_id(), source.source_sn()))
@@ -320,8 +332,7 @@ struct Receiver(Arc<Reception>, Trust);
 impl Receiver {
     /// Takes a live message. A message that is known to come from another session is dropped.
     fn hear(&self, sample: Sample) {
-        let source = sample.source_info().map(|source| source.source_id().zid());
-        if source.is_none_or(|source| self.1.has(&source) == Some(false)) {
+        if sender(&sample).is_none_or(|source| self.1.has(&source) == Some(false)) {
             self.0.foreign.count();
         } else {
             self.0.hear(sample);

@@ -33,7 +33,7 @@ pub use tactus_calibrate::{FaultKind, FaultyElement};
 /// Constants that `tactus-bench evidence` looks at on tuning sets, and the level of the tests.
 pub mod constants {
     pub use crate::search::{ALPHA, FORM_SHARE, LEFT_SHARE, MISFIT_SHARE, SET_PROBABILITY, TAKEN_SHARE};
-    pub use crate::verdict::NEAR_CLOSES;
+    pub use crate::verdict::{DRIFTS, NEAR_CLOSES};
 }
 pub use verdict::{
     AddedEffect, BaseModel, Closed, Confirmation, Discovery, DraftedEffect, ElementGap, Estimated, Final,

@@ -62,5 +62,5 @@ pub use discovery::{
 };
 pub(crate) use drafting::confirmation;
 pub use drafting::{Confirmation, DraftedEffect};
-pub use judged::NEAR_CLOSES;
+pub use judged::{DRIFTS, NEAR_CLOSES};
 pub use structured::Structured;

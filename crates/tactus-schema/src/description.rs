@@ -43,6 +43,12 @@ pub(crate) fn check_schema(read: &str, stated: &str) -> Result<(), WrongField> {
     if stated == read {
         Ok(())
     } else {
-        Err(wrong("schema", format!("this program reads {read:?} here, not {stated:?}")))
+        let is_draft_for_model = (read, stated) == (crate::model::SCHEMA, crate::draft::SCHEMA);
+        let hint = if is_draft_for_model {
+            "; a draft acts in a model: discovery wrote model.toml beside it"
+        } else {
+            ""
+        };
+        Err(wrong("schema", format!("this program reads {read:?} here, not {stated:?}{hint}")))
     }
 }

@@ -130,18 +130,25 @@ fn section(
 ) -> Result<()> {
     // Writing to a string cannot fail.
     let _written = write!(page, "\n## {title}\n\n{what}\n");
-    for table in tables {
-        let _written = write!(page, "\n### {title}: {}\n\n", table.heading);
-        page.push_str(&rows(top, table).with_context(|| format!("{} in {}", table.of, table.source))?);
-    }
+    all_rows(top, page, title, tables)?;
     let text = fs::read_to_string(top.join(shipped)).with_context(|| format!("cannot read {shipped}"))?;
     let _written =
         write!(page, "\n### {title}: a whole file\n\n`{shipped}`:\n\n```toml\n{}\n```\n", text.trim());
     Ok(())
 }
 
+/// The keys of each of these types, under a heading.
+pub(super) fn all_rows(top: &Path, page: &mut String, title: &str, tables: &[Table]) -> Result<()> {
+    for table in tables {
+        // Writing to a string cannot fail.
+        let _written = write!(page, "\n### {title}: {}\n\n", table.heading);
+        page.push_str(&rows(top, table).with_context(|| format!("{} in {}", table.of, table.source))?);
+    }
+    Ok(())
+}
+
 /// The keys of a type.
-pub(super) fn rows(top: &Path, table: &Table) -> Result<String> {
+fn rows(top: &Path, table: &Table) -> Result<String> {
     let file = read(top, table.source)?;
     let mut out = String::new();
     if let Ok(found) = structure(&file, table.of) {

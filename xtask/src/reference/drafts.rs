@@ -9,7 +9,7 @@ use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, When};
 use tactus_schema::draft::DraftStatus;
 
-use super::configuration::{Table, rows, table};
+use super::configuration::{Table, all_rows, table};
 use super::source::{doc, enumeration, read};
 
 const FILE: &str = "crates/tactus-schema/src/draft.rs";
@@ -31,12 +31,10 @@ pub(super) fn section(top: &Path) -> Result<String> {
                     A draft that was only stated, by hand, needs `schema`, `status = \"drafted\"` and `[effect]`. One with a covariance or nearest classes \
                     needs `[evidence]`, and one that is confirmed or refuted needs `[confirmation]`: else the file has lost its end.\n"
         .to_owned();
-    for table in KEYS {
-        // Writing to a string cannot fail.
-        let _written = write!(page, "\n### Drafts: {}\n\n{}", table.heading, rows(top, &table)?);
-    }
+    all_rows(top, &mut page, "Drafts", &KEYS)?;
     page.push_str("\n### Drafts: `status`\n\n| word | means |\n|---|---|\n");
     for status in DraftStatus::ALL {
+        // Writing to a string cannot fail.
         let _written = writeln!(page, "| `{}` | {} |", status.name(), status.meaning());
     }
     page.push_str("\n### Drafts: `carrier`, what the curve is added to\n\n| carrier | unit of the curve | stage |\n|---|---|---|\n");

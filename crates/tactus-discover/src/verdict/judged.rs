@@ -26,7 +26,7 @@ const LITTLE_NOISE: f64 = 0.5;
 pub const NEAR_CLOSES: f64 = 0.85;
 
 /// Effects that go where they like between two presses.
-const DRIFTS: [&str; 2] = ["baseline-drift", "gain-drift"];
+pub const DRIFTS: [&str; 2] = ["baseline-drift", "gain-drift"];
 
 /// Judges grown models beside the base model.
 pub(super) struct Judge<'a> {

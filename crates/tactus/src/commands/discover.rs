@@ -22,7 +22,7 @@ use tactus_report::discovery::{
     ActiveRun, DataSource, DiscoveryReport, LabEffect, discovery_html, discovery_json, draft_status,
 };
 use tactus_schema::draft::{DraftEvidence, DraftFile, DraftStatus, Nearest};
-use tactus_schema::{Model, ModelFileError, Rig, stated_schema};
+use tactus_schema::{Model, Rig};
 
 use crate::cli::{Ablation, Common, DiscoverArgs};
 use crate::commands::library::Held;
@@ -240,18 +240,10 @@ impl Discovered {
     }
 }
 
-/// What is wrong with the text of a model file. A draft is no model.
-pub(crate) fn no_model(text: &str, error: &ModelFileError) -> String {
-    let is_draft = stated_schema(text) == Some(tactus_schema::draft::SCHEMA);
-    let hint = if is_draft { "; a draft acts in a model: discovery wrote model.toml beside it" } else { "" };
-    format!("{error}{hint}")
-}
-
 /// Reads a model file.
-fn declared(path: &Path) -> anyhow::Result<Model> {
+pub(crate) fn declared(path: &Path) -> anyhow::Result<Model> {
     let text = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-    let refused =
-        |error| Failure::new(Exit::Usage, format!("{}: {}", path.display(), no_model(&text, &error)));
+    let refused = |error| Failure::new(Exit::Usage, format!("{}: {error}", path.display()));
     Ok(Model::from_toml(&text).map_err(refused)?)
 }
 

@@ -11,7 +11,7 @@ use tactus_scene::{GpuRenderer, Pose, Renderer};
 use tactus_schema::model::Model;
 
 use crate::cli::SimulateArgs;
-use crate::commands::discover::no_model;
+use crate::commands::discover::declared;
 use crate::exit::{Exit, Failure, in_words};
 
 /// The characterisation of the paper's sensor.
@@ -103,11 +103,7 @@ impl Scene {
 fn model(args: &SimulateArgs) -> anyhow::Result<Model> {
     let array = args.array.as_deref().map(array).transpose()?;
     if let Some(path) = &args.model {
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-        let model = Model::from_toml(&text).map_err(|error| {
-            Failure::new(Exit::Usage, format!("{}: {}", path.display(), no_model(&text, &error)))
-        })?;
+        let model = declared(path)?;
         return Ok(match array {
             Some(array) if array != model.base.array => model.on(array),
             _ => model,
