@@ -37,13 +37,16 @@
 //! | knots.rs | `STEP` | `1e-3` | convention | small beside a range, large beside its rounding |
 //! | knots.rs | `OF_LINE` | `10` | cost | knots are columns of a pass |
 //! | knots.rs | `OF_TIMES` | `9` | cost | knots are columns of a pass |
+//! | knots.rs | `OF_DELAYS` | `8` | cost | knots are columns of a pass |
 //! | knots.rs | `OF_THRESHOLDS` | `8` | cost | knots are columns of a pass |
+//! | knots.rs | `OF_WIDTHS` | `5` | cost | each is an image |
 //! | knots.rs | `PRESSES_A_KNOT` | `4` | convention | what drifts holds for several presses |
 //! | knots.rs | `OF_TIME_LINE` | `8..=24` | cost | 8 is as free as formulas |
 //! | knots.rs | `OVER_THE_SENSOR` | `5` | cost | straight lines over four parts of the sensor |
 //! | knots.rs | `OF_DEPTH_OR_TIME` | `8` | cost | the same over seven |
 //! | knots.rs | `APART_MM` | `0.05` | convention | as places that count as one |
 //! | knots.rs | `APART_S` | `1.0` | convention | shorter is no table of time |
+//! | knots.rs | `WIDTHS` | `[1.4, 6.0]` | convention | narrower is the core's own width, wider is flat over the sensor |
 //! | knots.rs | `LEAST_THRESHOLD` | `0.03` | convention | of the greatest |
 //! | knots.rs | `LEAST_SPEED` | `0.01` | convention | of the greatest |
 //! | predictor.rs | `IMAGES_MAX` | `200_000` | cost | 130 MB; 600,000 at first |
@@ -88,7 +91,7 @@ mod sums;
 mod tiles;
 mod totals;
 
-pub(crate) use folds::{CLIP, FOLDS, FoldsOf, gains_by_folds};
+pub(crate) use folds::{ByFolds, CLIP, FOLDS, FoldsOf, gains_by_folds};
 pub(crate) use grams::Grams;
 pub(crate) use heldout::LOUD;
 pub(crate) use knots::{hat, of_formulas, places, table_places};

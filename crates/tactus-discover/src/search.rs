@@ -148,7 +148,7 @@ mod wiring;
 pub(crate) use candidates::Candidate;
 pub use contests::{Contest, Rivalry, TAKEN_SHARE};
 pub use draft::NoDraft;
-pub(crate) use draft::{Against, Drafted};
+pub(crate) use draft::{Against, Drafted, Outcome};
 pub use forms::RefutedFormula;
 pub(crate) use forms::{Formed, Refuted};
 pub(crate) use given_up::last_words;

@@ -60,8 +60,8 @@
 //! | element | `crosstalk`, `miswired`, `saturation` |
 //! | readout | `baseline-drift`, `gain-drift`, `low-pass`, `scan-skew`, `periodic-interference`, `quantisation` |
 //!
-//! **Cost**: an image is computed when the contact changes, as without effects. `heavy-tail` computes two images, and an
-//! image of a leaning tool takes several times as long. Everything else takes a few operations per element and moment.
+//! **Cost**: an image is computed when the contact changes, as without effects. `heavy-tail` computes an image for each
+//! Gaussian, and an image of a leaning tool takes several times as long. Everything else takes a few operations per element and moment.
 //!
 //! **Another effect** joins the library as `docs/adding-an-effect.md` describes. A lab's own effect needs no change of this
 //! crate: it is a `static` [`Definition`], given to [`Effect::of`].

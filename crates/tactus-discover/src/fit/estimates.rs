@@ -8,6 +8,8 @@
 //! mean over held-out readings of J' C J / noise^2                 what their errors add to the squares there
 //! ```
 //!
+//! A fold of the fitted presses is predicted by a fit to the others, of which the numbers have a covariance of their own.
+//!
 //! Gains and baselines act on one element each, so `C` has a part for each element, and one for the shared numbers less what gains and
 //! baselines fit of them ([`super::elimination`]).
 
@@ -21,6 +23,11 @@ use crate::data::DiscoverError;
 
 /// A direction of which the fitted readings show less than this share is none that was estimated.
 const SHOWN_LEAST: f64 = 1e-6;
+
+/// The sum of the squared errors of predictions of some readings that a fit to others has not seen, in units of the noise's variance.
+pub(super) fn errors(elimination: &Elimination, fitted: &Total, predicted: &Total) -> f64 {
+    own_errors(elimination, fitted, predicted) + shared_errors(elimination, predicted)
+}
 
 impl Problem<'_> {
     /// Mean square of the errors of a fitted model's predictions of held-out frames, in units of the noise's variance. `None` for models
@@ -38,9 +45,8 @@ impl Problem<'_> {
         let held = self.of_held_out_frames();
         let (fitted, held_out) = (sums_of(self)?, sums_of(&held)?);
         let elimination = Elimination::of(self, &fitted, &segments, &at.parameters);
-        let of_elements = own_errors(&elimination, &fitted, &held_out);
-        let of_shared = shared_errors(&elimination, &held_out);
-        Ok(Some(self.variance * (of_elements + of_shared) / held.readings_in_frames()))
+        let errors = errors(&elimination, &fitted, &held_out);
+        Ok(Some(self.variance * errors / held.weighed_readings()))
     }
 
     /// The same problem with each held-out frame in place of the fitted ones.
@@ -53,24 +59,24 @@ impl Problem<'_> {
         Self { train: (0..bins.len()).map(weight).collect(), ..self.clone() }
     }
 
-    /// Number of readings in the frames that have a weight of 1 each; at least 1.
-    fn readings_in_frames(&self) -> f64 {
+    /// Number of readings that together have the weight of the fitted ones; at least 1.
+    pub(super) fn weighed_readings(&self) -> f64 {
         let elements = self.element_weight.iter().filter(|weight| **weight > 0.0).count();
         (self.train.iter().sum::<f64>() * elements as f64).max(1.0)
     }
 }
 
 /// What the errors of gains and baselines add, the shared numbers being known.
-fn own_errors(elimination: &Elimination, fitted: &Total, held_out: &Total) -> f64 {
+fn own_errors(elimination: &Elimination, fitted: &Total, predicted: &Total) -> f64 {
     let mut sum = 0.0;
     for (element, square) in elimination.gain_squares.iter().enumerate() {
         let gain = if *square > 0.0 { 1.0 / square } else { 0.0 };
-        for (fitted, held_out) in fitted.segments.iter().zip(&held_out.segments) {
+        for (fitted, predicted) in fitted.segments.iter().zip(&predicted.segments) {
             let [one, mixed, _] = fitted.own[element];
             if one > 0.0 {
                 // The baseline follows the gain's error, and has one of its own.
                 let along = mixed / one;
-                let [of_one, of_mixed, of_square] = held_out.own[element];
+                let [of_one, of_mixed, of_square] = predicted.own[element];
                 sum += gain * (of_square - 2.0 * along * of_mixed + along * along * of_one) + of_one / one;
             }
         }
@@ -79,14 +85,14 @@ fn own_errors(elimination: &Elimination, fitted: &Total, held_out: &Total) -> f6
 }
 
 /// What the errors of the shared numbers add, gains and baselines following them.
-fn shared_errors(elimination: &Elimination, held_out: &Total) -> f64 {
+fn shared_errors(elimination: &Elimination, predicted: &Total) -> f64 {
     let count = elimination.reduced.nrows() - 1;
     let is_shown = |one: &usize| elimination.reduced[(*one, *one)] > SHOWN_LEAST * elimination.whole[*one];
     let shown: Vec<usize> = (0..count).filter(is_shown).collect();
     let of = |matrix: &DMatrix<f64>| {
         DMatrix::from_fn(shown.len(), shown.len(), |i, j| matrix[(shown[i], shown[j])])
     };
-    let left = left_of(elimination, held_out);
+    let left = left_of(elimination, predicted);
     // In units of each direction's size.
     let sizes: Vec<f64> = shown.iter().map(|one| elimination.whole[*one].sqrt()).collect();
     let scaled = |matrix: DMatrix<f64>| {
@@ -96,12 +102,12 @@ fn shared_errors(elimination: &Elimination, held_out: &Total) -> f64 {
     (covariance * scaled(of(&left))).trace()
 }
 
-/// Products on the held-out readings of the directions less what the fitted gains and baselines take of them.
-fn left_of(elimination: &Elimination, held_out: &Total) -> DMatrix<f64> {
-    let mut left = held_out.products.clone();
+/// Products on the predicted readings of the directions less what the fitted gains and baselines take of them.
+fn left_of(elimination: &Elimination, predicted: &Total) -> DMatrix<f64> {
+    let mut left = predicted.products.clone();
     let gains = &elimination.gains;
     for (Border { by_baseline, by_gain, own }, of_segment) in
-        held_out.segments.iter().zip(&elimination.baselines)
+        predicted.segments.iter().zip(&elimination.baselines)
     {
         let last = gains.ncols();
         let baselines = DMatrix::from_fn(gains.nrows(), last, |element, number| {

@@ -10,6 +10,9 @@
 //! The presses that show a parameter may all be in one fold. So each parameter has a prior: the coefficients of a class that it had with
 //! the evidence ([`Prior`]), and of any other parameter that it stays within the longest step of a fit.
 //!
+//! The same fits predict each reading of the presses that they have not seen ([`ByFolds`]), in the same approximation: what the data hardly
+//! determine may take long steps, along which a prediction moves little to first order and much beyond.
+//!
 //! The held-out presses take no part.
 //!
 //! # Source
@@ -18,6 +21,7 @@
 use nalgebra::DMatrix;
 
 use super::elimination::Elimination;
+use super::estimates::errors;
 use super::knots::{bounded, is_of_run_time};
 use super::parameters::{Parameters, Term};
 use super::problem::{Fitted, Free, Problem, least_step};
@@ -74,6 +78,54 @@ impl Known {
     }
 }
 
+/// A model whose fitted presses are predicted by fits to other presses: each of five folds by that to the others.
+pub(crate) struct ByFolds {
+    /// By how much this moves what the fit to all predicts: bin by bin, element by element. 0 for bins that are not fitted.
+    pub(crate) moved: Vec<f64>,
+    /// Mean square of the errors that estimated numbers make there, in units of the noise's variance.
+    pub(crate) estimation_error: f64,
+}
+
+/// What all fits to folds of presses are made from.
+struct OfPresses {
+    known: Known,
+    segments: Segments,
+    blocks: Vec<Block>,
+    /// The press of each block.
+    press: Vec<usize>,
+    /// Number of free parameters.
+    count: usize,
+}
+
+/// A fit to all folds of presses but one.
+struct Fold {
+    /// The sums over the others, and what gains and baselines fit of theirs.
+    others: Total,
+    fitted: Elimination,
+    /// The steps that they want.
+    steps: Vec<f64>,
+}
+
+impl OfPresses {
+    /// True if a block is one of a fold's.
+    fn is_in(&self, block: usize, fold: usize) -> bool {
+        self.press[block] % FOLDS == fold
+    }
+
+    /// The sums over the blocks that are in a fold, or not.
+    fn sum(&self, problem: &Problem<'_>, fold: usize, is_in: bool) -> Total {
+        let blocks = self.blocks.iter().enumerate().filter(|(block, _)| self.is_in(*block, fold) == is_in);
+        sum(blocks.map(|(_, block)| block), self.count, &self.segments, problem)
+    }
+
+    fn without(&self, problem: &Problem<'_>, at: &Fitted, fold: usize) -> Fold {
+        let others = self.sum(problem, fold, false);
+        let fitted = Elimination::of(problem, &others, &self.segments, &at.parameters);
+        let steps = self.known.steps(&fitted);
+        Fold { others, fitted, steps }
+    }
+}
+
 impl Problem<'_> {
     /// The weighted squares of what a model leaves, block by block, each predicted by a fit to the other folds. `None` for models with
     /// random walks, which have a state of their own in every press.
@@ -91,23 +143,63 @@ impl Problem<'_> {
         }
     }
 
-    fn left_by_presses(&self, at: &Fitted) -> Result<Vec<f64>, DiscoverError> {
-        let known = self.known(&at.parameters);
+    /// A model with each fold of the fitted presses predicted by a fit to the others. `None` for models with random walks.
+    pub(crate) fn by_folds(&self, at: &Fitted) -> Result<Option<ByFolds>, DiscoverError> {
+        if at.parameters.walk.is_some() {
+            return Ok(None);
+        }
+        let of_presses = self.of_presses(at)?;
+        let folds: Vec<Fold> = (0..FOLDS).map(|fold| of_presses.without(self, at, fold)).collect();
+        let squares = folds.iter().enumerate().map(|(number, Fold { others, fitted, .. })| {
+            errors(fitted, others, &of_presses.sum(self, number, true))
+        });
+        let estimation_error = self.variance * squares.sum::<f64>() / self.weighed_readings();
+        let bins = self.predictor.bins;
+        let fold_of = |bin: usize| {
+            let block = of_presses.blocks.partition_point(|block| block.first_bin <= bin).checked_sub(1);
+            block.filter(|_| !bins.heldout[bin]).map(|block| of_presses.press[block] % FOLDS)
+        };
+        let unseen: Vec<(usize, usize)> =
+            (0..bins.len()).filter_map(|bin| Some((bin, fold_of(bin)?))).collect();
+        let readings = |bin: usize| bin * bins.elements..(bin + 1) * bins.elements;
+        let mut moved = vec![0.0; at.predicted.len()];
+        for (number, one) in self.free(&at.parameters).into_iter().enumerate() {
+            let slope = self.slope(&at.parameters, &at.predicted, one)?;
+            for (bin, fold) in &unseen {
+                let step = folds[*fold].steps[number];
+                let of_bin = moved[readings(*bin)].iter_mut().zip(&slope[readings(*bin)]);
+                of_bin.for_each(|(moved, slope)| *moved += step * slope);
+            }
+        }
+        let by_gain = self.by_gain(at)?;
+        let element: Vec<_> = folds.iter().map(|fold| fold.fitted.fitted(&fold.steps)).collect();
+        for (bin, fold) in &unseen {
+            let of_bin = moved[readings(*bin)].iter_mut().zip(&by_gain[readings(*bin)]).enumerate();
+            for (number, (moved, by_gain)) in of_bin {
+                let [gain, baseline] = element[*fold](of_presses.segments.of_bin[*bin], number);
+                *moved += gain * by_gain + baseline;
+            }
+        }
+        Ok(Some(ByFolds { moved, estimation_error }))
+    }
+
+    fn of_presses(&self, at: &Fitted) -> Result<OfPresses, DiscoverError> {
         let own = self.own(&at.parameters);
         let count = own.len();
         let segments = Segments::of(self, &at.parameters);
         let total = self.sums(&at.parameters, &at.predicted, own, count, Kept::AllAndBlocks, &segments)?;
         let press = self.press_of_blocks(&total.blocks);
-        let mut left = vec![0.0; press.len()];
+        Ok(OfPresses { known: self.known(&at.parameters), segments, blocks: total.blocks, press, count })
+    }
+
+    fn left_by_presses(&self, at: &Fitted) -> Result<Vec<f64>, DiscoverError> {
+        let of_presses = self.of_presses(at)?;
+        let mut left = vec![0.0; of_presses.blocks.len()];
         for fold in 0..FOLDS {
-            let is_in = |press: usize| press % FOLDS == fold;
-            let others = total.blocks.iter().zip(&press).filter(|(_, press)| !is_in(**press));
-            let others = sum(others.map(|(block, _)| block), count, &segments, self);
-            let fitted = Elimination::of(self, &others, &segments, &at.parameters);
-            let steps = known.steps(&fitted);
+            let Fold { fitted, steps, .. } = of_presses.without(self, at, fold);
             let element = fitted.fitted(&steps);
-            let blocks = total.blocks.iter().zip(&press).zip(&mut left);
-            for ((block, _), left) in blocks.filter(|((_, press), _)| is_in(**press)) {
+            let blocks = of_presses.blocks.iter().zip(&mut left).enumerate();
+            for (_, (block, left)) in blocks.filter(|(number, _)| of_presses.is_in(*number, fold)) {
                 *left = left_of(block, &steps, |number| element(block.segment, number));
             }
         }
@@ -187,7 +279,7 @@ impl Problem<'_> {
     }
 
     /// The press of each block, counted from 0 in order of time. Where many short blocks are joined, that of the first.
-    fn press_of_blocks(&self, blocks: &[Block]) -> Vec<usize> {
+    pub(super) fn press_of_blocks(&self, blocks: &[Block]) -> Vec<usize> {
         let (bins, frames) = (self.predictor.bins, self.predictor.frames);
         let mut presses: Vec<usize> = Vec::with_capacity(blocks.len());
         let mut before = None;

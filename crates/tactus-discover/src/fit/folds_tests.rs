@@ -66,6 +66,34 @@ fn what_is_left_is_what_fits_to_the_other_presses_leave() {
     }
 }
 
+/// The models of the folds against fits to the other presses that approximate nothing, on the presses of each fold.
+#[test]
+fn each_press_is_predicted_as_by_a_fit_to_the_others() {
+    let (known, hidden) = (known(), hardening());
+    let frames = hardened(&known, 5);
+    let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
+    let problem = prepared.problem();
+    let at = problem.fit_from(prepared.base.parameters.with(Term::of(&hidden)), 12).unwrap();
+    let ByFolds { moved, .. } = problem.by_folds(&at).unwrap().unwrap();
+    let press = presses(&problem);
+    for fold in 0..FOLDS {
+        let is_in = |bin: usize| press[bin].is_some_and(|press| press % FOLDS == fold);
+        let mut others = prepared.problem();
+        for (bin, weight) in others.train.iter_mut().enumerate() {
+            *weight *= f64::from(u8::from(!is_in(bin)));
+        }
+        let wanted = others.fit_from(at.parameters.clone(), 12).unwrap().predicted;
+        let places = (0..moved.len()).filter(|place| is_in(place / ELEMENTS));
+        let [apart, all] = places.fold([0.0; 2], |[apart, all], place| {
+            let wanted = wanted[place] - at.predicted[place];
+            [apart + (moved[place] - wanted).powi(2), all + wanted.powi(2)]
+        });
+        assert!(apart < 0.01 * all, "fold {fold}: {apart} of {all}");
+    }
+    let held_out = (0..moved.len()).filter(|place| problem.predictor.bins.heldout[place / ELEMENTS]);
+    assert!(held_out.map(|place| moved[place]).all(|moved| moved == 0.0));
+}
+
 #[test]
 fn presses_that_a_fit_has_not_seen_are_further_from_it_and_a_true_effect_gains_on_them() {
     let (known, hidden) = (known(), hardening());

@@ -7,6 +7,7 @@
 use nalgebra::DMatrix;
 
 use super::elimination::{Elimination, Parts};
+use super::folds::FOLDS;
 use super::parameters::Parameters;
 use super::problem::{Fitted, Problem};
 use super::sums::{Direction, with_more_gain};
@@ -20,6 +21,8 @@ pub(crate) struct Grams {
     /// Each direction's product with itself before that.
     whole: Vec<f64>,
     parts: Parts,
+    /// The fold of each block, by presses.
+    fold: Vec<usize>,
 }
 
 impl Problem<'_> {
@@ -60,7 +63,8 @@ impl Problem<'_> {
                 reduced[(one, left - 1)] = reduced[(left - 1, one)];
             }
         }
-        Ok(Grams { reduced, whole: elimination.whole.split_off(own), parts })
+        let fold = self.press_of_blocks(&total.blocks).into_iter().map(|press| press % FOLDS).collect();
+        Ok(Grams { reduced, whole: elimination.whole.split_off(own), parts, fold })
     }
 
     /// Sizes of directions at a model, less what gains, baselines and its own parameters fit: how many standard errors each is from 0.
@@ -92,9 +96,7 @@ impl Problem<'_> {
             left.iter_mut().zip(slope).for_each(|(left, slope)| *left -= taken * slope);
         }
         let segments = Segments::of(self, &at.parameters);
-        let (more, step) = with_more_gain(&at.parameters);
-        let mut by_gain = self.predict(&more)?;
-        by_gain.iter_mut().zip(&at.predicted).for_each(|(more, now)| *more = (*more - now) / step);
+        let by_gain = self.by_gain(at)?;
         let elements = self.predictor.bins.elements;
         let fitted = elimination.fitted(&taken);
         for (bin, left) in left.chunks_exact_mut(elements).enumerate() {
@@ -106,6 +108,14 @@ impl Problem<'_> {
             }
         }
         Ok(left)
+    }
+
+    /// Derivative of every reading by its element's gain.
+    pub(super) fn by_gain(&self, at: &Fitted) -> Result<Vec<f64>, DiscoverError> {
+        let (more, step) = with_more_gain(&at.parameters);
+        let mut by_gain = self.predict(&more)?;
+        by_gain.iter_mut().zip(&at.predicted).for_each(|(more, now)| *more = (*more - now) / step);
+        Ok(by_gain)
     }
 
     /// The directions of a model's free parameters.
@@ -158,6 +168,45 @@ impl Grams {
     /// Each block's product of a direction and the residual.
     pub(crate) fn along(&self, direction: usize) -> &[f64] {
         &self.parts.along[direction]
+    }
+
+    /// The reduced products of the presses that are not in a fold: with the residual as summed over their blocks, of the directions in
+    /// proportion to their number.
+    pub(crate) fn without(&self, fold: usize) -> DMatrix<f64> {
+        let others = self.fold.iter().filter(|of| **of != fold).count() as f64;
+        let mut products = &self.reduced * (others / self.fold.len().max(1) as f64);
+        let last = products.nrows() - 1;
+        for direction in 0..last {
+            let along = self.along(direction).iter().zip(&self.fold);
+            let wanted: f64 = along.filter(|(_, of)| **of != fold).map(|(one, _)| one).sum();
+            products[(direction, last)] = wanted;
+            products[(last, direction)] = wanted;
+        }
+        products
+    }
+
+    /// By how much steps along some directions, for each fold those that the others want, bring the model nearer to the presses of the fold:
+    /// block by block. A block has its share of the steps' square as it has of the directions' own.
+    pub(crate) fn gains<'a>(&self, steps: impl Fn(usize) -> &'a [(usize, f64)]) -> Vec<f64> {
+        let own = |block: usize, steps: &[(usize, f64)]| -> f64 {
+            steps.iter().map(|(direction, step)| step * step * self.squares(*direction)[block]).sum()
+        };
+        // The steps' square over the sum of the directions' own.
+        let crowded = |fold| {
+            let steps = steps(fold);
+            let products = steps.iter().flat_map(|(one, step)| {
+                steps.iter().map(move |(other, another)| step * another * self.reduced[(*one, *other)])
+            });
+            let of_all: f64 = (0..self.fold.len()).map(|block| own(block, steps)).sum();
+            if of_all > 0.0 { products.sum::<f64>() / of_all } else { 0.0 }
+        };
+        let crowded: Vec<f64> = (0..FOLDS).map(crowded).collect();
+        let gain = |(block, fold): (usize, &usize)| {
+            let steps = steps(*fold);
+            let along: f64 = steps.iter().map(|(one, step)| step * self.along(*one)[block]).sum();
+            2.0 * along - crowded[*fold] * own(block, steps)
+        };
+        self.fold.iter().enumerate().map(gain).collect()
     }
 
     /// Each block's product of a direction with itself.

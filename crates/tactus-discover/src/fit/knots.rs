@@ -18,10 +18,12 @@ use crate::data::{Frames, interval_s, presses};
 
 /// Step of a value for derivatives, as a share of its range.
 const STEP: f64 = 1e-3;
-/// Number of knots of a line, of weights of times, and of weights of thresholds.
+/// Number of knots of a line, of weights of times, of delays, of thresholds, and of widths.
 const OF_LINE: usize = 10;
 const OF_TIMES: usize = 9;
+const OF_DELAYS: usize = 8;
 const OF_THRESHOLDS: usize = 8;
+const OF_WIDTHS: usize = 5;
 /// A line in time has a knot for so many presses, and so many knots at most: what drifts holds for several presses in a row. With fewer than
 /// the least, formulas follow as much.
 const PRESSES_A_KNOT: usize = 4;
@@ -32,6 +34,8 @@ const OVER_THE_SENSOR: usize = 5;
 const OF_DEPTH_OR_TIME: usize = 8;
 const APART_MM: f64 = 0.05;
 const APART_S: f64 = 1.0;
+/// The narrowest and the widest Gaussian of a tail, over the core.
+const WIDTHS: [f64; 2] = [1.4, 6.0];
 /// The narrowest threshold and the slowest speed, as shares of the greatest.
 const LEAST_THRESHOLD: f64 = 0.03;
 const LEAST_SPEED: f64 = 0.01;
@@ -297,6 +301,9 @@ pub(crate) fn places(curve: &FreeCurve, problem: &Problem<'_>) -> Vec<f64> {
             if OF_TIME_LINE.contains(&count) { even(duration_s, count) } else { Vec::new() }
         }
         ("at_s", _) => logarithmic(2.0 * interval_s(frames), duration_s, OF_TIMES),
+        // Between two frames nothing tells when.
+        ("delay_s", _) => even(OF_DELAYS as f64 * interval_s(frames), OF_DELAYS),
+        ("at_ratio", _) => logarithmic(WIDTHS[0], WIDTHS[1], OF_WIDTHS),
         ("at_mm_per_s", _) => {
             let fastest = fastest_mm_per_s(frames);
             logarithmic(LEAST_SPEED * fastest, fastest, OF_LINE)

@@ -68,10 +68,24 @@ pub(crate) struct Drafted {
     pub(crate) ln_odds: f64,
     /// In how many of five folds it came first.
     pub(crate) folds: usize,
+    /// By how much it is nearer to presses that its curve has not seen, block by block.
+    pub(crate) unseen_gains: Vec<f64>,
     /// The classes that come nearest, with by how much each is behind.
     pub(crate) nearest: Vec<(&'static str, f64)>,
     /// Other drafts that these data cannot tell from it, in words.
     pub(crate) alike: Vec<String>,
+}
+
+impl Drafted {
+    /// Its name.
+    pub(crate) fn name(&self) -> &'static str {
+        self.at.parameters.terms.last().map_or("", |term| term.definition.name)
+    }
+
+    /// True if another one acts on the same by the same.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        self.draft.carrier == other.draft.carrier && self.draft.covariates[0] == other.draft.covariates[0]
+    }
 }
 
 /// Why there is no draft.
@@ -87,8 +101,10 @@ pub enum NoDraft {
     TakenUp,
     /// As an effect it gains too little.
     NoGain,
-    /// With it the model is further from the held-out presses.
+    /// With it the model is further from presses that its fit has not seen.
     Further,
+    /// The fitted presses leave nothing to draft: what is left shows on the held-out presses alone.
+    OnlyHeldOut,
     /// It acts where a name acts, and so little that it may be an error of the name's form.
     OfAName,
 }
@@ -102,7 +118,13 @@ impl NoDraft {
             Self::Unsteady => "different parts of the data prefer different drafts".into(),
             Self::TakenUp => "recalibration takes up most of what it would explain".into(),
             Self::NoGain => "as an effect it explains too little".into(),
-            Self::Further => "with what comes first the model is further from the held-out presses".into(),
+            Self::Further => {
+                "what comes first takes the model further from presses that its fit has not seen".into()
+            }
+            Self::OnlyHeldOut => {
+                "the fitted presses leave nothing to draft: what is left shows on the held-out presses alone"
+                    .into()
+            }
             Self::OfAName => "it may be an error of the form of a name that acts at the same place".into(),
         }
     }
@@ -134,6 +156,7 @@ struct AsEffect {
     at: Fitted,
     covariance: Vec<Vec<f64>>,
     knots: Vec<[f64; 3]>,
+    unseen_gains: Vec<f64>,
 }
 
 /// An atom with its columns in one of the passes that test each column by itself.
@@ -253,7 +276,8 @@ impl Search<'_> {
             return Ok(Err(NoDraft::Class(class)));
         }
         let atom = self.with_second(at, sight, &field.weighed[best].atom, ln_odds, field.count)?;
-        let Some(AsEffect { draft, at: with, covariance, knots }) = self.as_effect(at, sight, atom, name)?
+        let Some(AsEffect { draft, at: with, covariance, knots, unseen_gains }) =
+            self.as_effect(at, sight, atom, name)?
         else {
             return Ok(Err(NoDraft::NoGain));
         };
@@ -261,6 +285,9 @@ impl Search<'_> {
             && with.cost >= cost
         {
             return Ok(Err(NoDraft::Class(nearest)));
+        }
+        if unseen_gains.iter().sum::<f64>() <= 0.0 {
+            return Ok(Err(NoDraft::Further));
         }
         if self.own_share(at, &with)? < OWN_LEAST {
             return Ok(Err(NoDraft::TakenUp));
@@ -278,6 +305,7 @@ impl Search<'_> {
             p_value,
             ln_odds,
             folds,
+            unseen_gains,
             nearest,
             alike,
         })))
@@ -357,23 +385,10 @@ impl Search<'_> {
         Evidence { additions, products, variance: self.problem.variance, present: &[] }
     }
 
-    /// In how many folds of blocks the best atom comes first or is as good as the first: of the blocks not in the fold, whose products with the
-    /// residual are summed.
+    /// In how many folds of presses the best atom comes first or is as good as the first, by the presses that are not in the fold.
     fn folds(&self, field: &Field<'_>, best: usize) -> usize {
-        let grams = field.grams;
-        let blocks = grams.along(0).len();
         let first_in = |fold: &usize| {
-            let is_other = |(block, _): &(usize, &f64)| block % FOLDS != *fold;
-            let share =
-                (0..blocks).filter(|block| block % FOLDS != *fold).count() as f64 / blocks.max(1) as f64;
-            let mut products = grams.reduced() * share;
-            let last = products.nrows() - 1;
-            for direction in 0..last {
-                let wanted: f64 =
-                    grams.along(direction).iter().enumerate().filter(is_other).map(|(_, one)| one).sum();
-                products[(direction, last)] = wanted;
-                products[(last, direction)] = wanted;
-            }
+            let products = field.grams.without(*fold);
             let mut ranked = ranked(&self.evidence_of(field.additions, &products));
             ranked.retain(|(one, _)| field.ranked.iter().any(|(there, _)| there == one));
             as_good_as_first(&ranked).iter().any(|(one, _)| field.is_like(*one, best))
@@ -435,6 +450,7 @@ impl Search<'_> {
             draft,
             at: fitted,
             covariance: scaled(reduced.covariance, by * by),
+            unseen_gains: curve.unseen_gains,
             knots: reduced.knots.into_iter().map(|[at, value, error]| [at, by * value, by * error]).collect(),
         }))
     }
@@ -448,7 +464,14 @@ impl Search<'_> {
         let directions = &additions[0].directions;
         let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
         let product = |i: usize, j: usize| grams.reduced()[(directions[i], directions[j])];
+        let of_others = |fold: usize| -> Vec<(usize, f64)> {
+            let products = grams.without(fold);
+            let evidence = self.evidence_of(&additions, &products);
+            evidence.coefficients(&evidence.set([0]))
+        };
+        let by_folds: Vec<Vec<(usize, f64)>> = (0..FOLDS).map(of_others).collect();
         Ok(curves::Curve {
+            unseen_gains: grams.gains(|fold| &by_folds[fold]),
             values: DVector::from_iterator(directions.len(), directions.iter().map(value)),
             gram: DMatrix::from_fn(directions.len(), directions.len(), product) / self.problem.variance,
         })

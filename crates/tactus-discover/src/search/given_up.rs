@@ -24,7 +24,7 @@ pub enum Because {
     Unconfirmed,
     /// What is drafted without it explains as much.
     Draft,
-    /// It closes this share of the gap without it on held-out presses, and an effect closes more of its own physics.
+    /// It closes this share of the gap without it on presses that its fit has not seen, and an effect closes more of its own physics.
     Far(f64),
 }
 
@@ -56,7 +56,7 @@ impl GivenUp {
             Because::Unconfirmed => "presses or elements that its fit has not seen do not confirm it".into(),
             Because::Draft => "what is drafted without it explains as much".into(),
             Because::Far(share) => format!(
-                "it comes nearest, and closes {:.0} % of the gap on held-out presses: an effect closes more of its own physics",
+                "it comes nearest, and closes {:.0} % of the gap on presses that its fit has not seen: an effect closes more of its own physics",
                 100.0 * share
             ),
         }

@@ -4,9 +4,10 @@ use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tactus_model::Effect;
+use tactus_model::effect::Definition;
 
 use super::{Score, standardised};
-use crate::fit::{Direction, Fitted, Free, Prepared, Problem, Term};
+use crate::fit::{Direction, FOLDS, Fitted, Free, Prepared, Problem, Term};
 use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
 
 /// The same products from whole columns, orthogonal to gains, baselines and the model's own parameters one by one.
@@ -24,7 +25,7 @@ fn products_are_those_of_whole_columns_that_are_projected_one_by_one() {
     let tried: Vec<_> = ["hardening", "crosstalk", "imprint"]
         .into_iter()
         .map(|name| {
-            let term = Term::neutral(tactus_model::effect::Definition::find(name).unwrap());
+            let term = Term::neutral(Definition::find(name).unwrap());
             let start = at.parameters.with(term);
             let term = start.terms.len() - 1;
             (start, Free::Of { term, parameter: 0 })
@@ -72,6 +73,36 @@ fn products_are_those_of_whole_columns_that_are_projected_one_by_one() {
     for ((left, weight), wanted) in left.iter().zip(problem.weights()).zip(whole.residual.iter()) {
         assert!((left * weight.sqrt() - wanted).abs() < 1e-4, "{left} {wanted}");
     }
+}
+
+/// What is planted alike in all presses is gained on each fold as on all, apart from the noise; noise alone gains nothing.
+#[test]
+fn a_step_gains_on_presses_that_had_no_say_in_it() {
+    let gained = |growth: f64, seed: u64| -> [f64; 2] {
+        let known = known();
+        let effect = [("growth_at_1_mm", growth), ("exponent", 2.0), ("own_share", 0.0)];
+        let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(seed));
+        let frames = measured(&known, &[Effect::new("hardening", effect).unwrap()], &noise);
+        let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
+        let (problem, base) = (prepared.problem(), &prepared.base);
+        let definition = Definition::find("hardening").unwrap();
+        let term = Term { values: vec![0.0, 2.0, 0.0], ..Term::neutral(definition) };
+        let start = base.parameters.with(term);
+        let free = Free::Of { term: start.terms.len() - 1, parameter: 0 };
+        let grams = problem.grams(base, vec![problem.towards(&start, free)]).unwrap();
+        let step = |fold| {
+            let products = grams.without(fold);
+            [(0, products[(0, 1)] / products[(0, 0)])]
+        };
+        let steps: Vec<[(usize, f64); 1]> = (0..FOLDS).map(step).collect();
+        let of_all = grams.wanted(0).powi(2) / grams.size(0).powi(2);
+        [grams.gains(|fold| &steps[fold]).iter().sum(), of_all]
+    };
+    let [unseen, of_all] = gained(0.01, 4);
+    assert!(of_all > 100.0 && unseen < of_all && unseen > 0.9 * of_all, "{unseen} {of_all}");
+    let of_noise = (0..12).map(|seed| gained(0.0, seed));
+    let [unseen, of_all] = of_noise.fold([0.0; 2], |sums, of| [sums[0] + of[0], sums[1] + of[1]]);
+    assert!(of_all > 3.0 && unseen < 0.0, "{unseen} {of_all}");
 }
 
 /// Columns and the residual, times the root of the weight, orthogonal to the columns of every baseline, gain and parameter of the model.

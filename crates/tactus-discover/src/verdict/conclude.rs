@@ -9,15 +9,15 @@ use super::discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Inclusion, Level, Split,
     Stair, Unexplained, Verdict,
 };
-use super::drafting::{DraftedEffect, Drafting};
-use super::held_out::{HeldOutResidual, closed_share};
-use super::judged::{Judge, Judged, corrected, least_p_value};
+use super::drafting::{self, DraftedEffect};
+use super::judged::{Judge, Judged, Opened, corrected, least_p_value};
+use super::residual::{Residual, closed_share};
 use crate::data::{DiscoverError, Fault, Gap};
 use crate::fit::{Fitted, Parameters, Prepared, RandomWalk};
-use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
+use crate::next::{DraftModel, Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
     ALPHA, Alike, Contest, Equivalent, GivenUp, Left, Located, NoDraft, NotShown, Options, POLISH_ROUNDS,
-    Round, Scattered, Search, Tried, names, not_shown, without,
+    Round, Rule, Scattered, Search, Tried, names, not_shown, without,
 };
 
 /// The outcome of a search.
@@ -54,33 +54,34 @@ pub(crate) fn conclude(
     let SearchOutcome { is_cut, before, scattered, .. } = found;
     let first = rounds.first();
     let base = &prepared.base;
-    let of_base = prepared.held(&base.parameters)?;
+    let of_base = prepared.residual(&base.parameters)?;
     let of_effects = first.map_or(1.0, |round| round.p_value);
     let own_noise = prepared.own_noise(&of_base);
     let p_value = least_p_value([of_effects, before.p_value, scattered.p_value, own_noise.p_value]);
     let judge = Judge {
         prepared,
         search,
-        of_base: &of_base,
         p_value,
         equivalent: &equivalent,
         contests: &contests,
         exchanged: &exchanged,
     };
-    let Judged {
-        confirmed,
-        left,
-        after,
-        of_noise,
-        held: of_grown,
-        floor,
-        levels: [base_level, grown_level],
-        closed,
-        is_left,
-        verdict,
-        given_up,
-        drafting: Drafting { draft, model: with_draft, .. },
-    } = judge.judged(confirmed)?;
+    let judged = judge.judged(confirmed)?;
+    search.reporter.tell("opening the held-out presses");
+    let Opened { levels: [base_level, grown_level], closed, is_left, verdict } =
+        judge.opened(&judged, &of_base)?;
+    let Judged { confirmed, left, after, of_noise, residual: of_grown, floor, given_up, draft, .. } = judged;
+    let with_draft = draft.as_ref().and_then(|found| found.as_ref().ok()).map(|found| DraftModel {
+        name: found.name(),
+        with: found.at.parameters.clone(),
+        without: confirmed.grown.parameters.clone(),
+    });
+    let draft = match draft {
+        Some(Ok(found)) => Some(Ok(Box::new(drafting::opened(prepared, *found, &of_grown, floor)?))),
+        Some(Err(why)) => drafting::is_open(verdict).then_some(Err(why)),
+        None => (drafting::is_open(verdict) && options.rule == Rule::Protocol)
+            .then_some(Err(NoDraft::OnlyHeldOut)),
+    };
     let few_presses = confirmed.few_presses();
     let Confirmed { grown, mut steps, tentative, .. } = confirmed;
     let names = names(&grown.parameters, search.known_terms);
@@ -178,7 +179,7 @@ pub(crate) fn cannot_judge(
     options: Options,
     experiments: &dyn Experiments,
 ) -> Result<Discovery, DiscoverError> {
-    let of_base = prepared.held(&prepared.base.parameters)?;
+    let of_base = prepared.residual(&prepared.base.parameters)?;
     let unjudged = prepared.unjudged(&of_base, prepared.level(&of_base, prepared.floor), options)?;
     let at = &prepared.base.parameters;
     let nothing = Open { pairs: &[], not_shown: &[], at, draft: None, lacks_repeats: true };
@@ -282,7 +283,7 @@ impl Prepared<'_> {
     /// A report of the recalibrated base model that judges nothing.
     fn unjudged(
         &self,
-        of_base: &HeldOutResidual,
+        of_base: &Residual,
         level: Level,
         options: Options,
     ) -> Result<Discovery, DiscoverError> {

@@ -4,7 +4,7 @@ use tactus_schema::table::{Phase, RowView};
 
 use super::*;
 use crate::fixtures::{ELEMENTS, ShippedRig, base, found, known, measured, processes};
-use crate::verdict::held_out::SEEN_NOISE;
+use crate::verdict::residual::SEEN_NOISE;
 use crate::{Floor, Frames, Rule, discover, predict};
 
 /// The deepest frame of each press, as in a table of averaged presses. Each element is pressed this many times.

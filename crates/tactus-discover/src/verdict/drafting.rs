@@ -1,15 +1,14 @@
-//! The draft of what a grown model leaves, and how much of it that closes on presses that nobody had opened.
+//! The draft of what a grown model leaves, and how much of it that closes on the held-out presses, which had no say in it.
 
 use tactus_model::Effect;
 use tactus_model::effect::{Definition, Draft};
 
 use super::closed::Closed;
 use super::discovery::{BaseModel, Verdict};
-use super::held_out::HeldOutResidual;
+use super::residual::Residual;
 use crate::data::{DiscoverError, Floor};
 use crate::fit::{Fitted, Prepared, Term};
-use crate::next::DraftModel;
-use crate::search::{ALPHA, Against, Drafted, FLIPS, NoDraft, POLISH_ROUNDS, Rule, Search, sign_flip_p};
+use crate::search::{ALPHA, Against, Drafted, FLIPS, Outcome, POLISH_ROUNDS, Rule, Search, sign_flip_p};
 
 /// A draft that closes less of what was left on held-out presses is partial.
 const CLOSED_LEAST: f64 = 0.7;
@@ -46,24 +45,10 @@ pub struct DraftedEffect {
 }
 
 impl DraftedEffect {
-    /// True if another one acts on the same by the same.
-    pub(super) fn is_like(&self, other: &Self) -> bool {
-        self.draft.carrier == other.draft.carrier && self.draft.covariates[0] == other.draft.covariates[0]
-    }
-
     /// True if it closes less than 70 % of what was left.
     pub fn is_partial(&self) -> bool {
         self.closed.is_none_or(|closed| closed.share < CLOSED_LEAST)
     }
-}
-
-/// The draft of a discovery, or why there is none, and the model with it.
-#[derive(Debug, Default)]
-pub(super) struct Drafting {
-    pub(super) draft: Option<Result<Box<DraftedEffect>, NoDraft>>,
-    pub(super) model: Option<DraftModel>,
-    /// That model as it was fitted.
-    pub(super) at: Option<Fitted>,
 }
 
 /// A grown model, and what is known of what it leaves.
@@ -72,7 +57,6 @@ pub(super) struct Leaves<'a> {
     /// True if a test rejects the model.
     pub(super) is_left: bool,
     pub(super) grown: &'a Fitted,
-    pub(super) of_grown: &'a HeldOutResidual,
     /// What a draft has to be better than.
     pub(super) against: Against<'a>,
 }
@@ -82,16 +66,11 @@ pub(super) fn drafted(
     prepared: &Prepared<'_>,
     search: &Search<'_>,
     leaves: &Leaves<'_>,
-    floor: Floor,
-) -> Result<Drafting, DiscoverError> {
-    let Leaves { verdict, is_left, grown, of_grown, against } = *leaves;
-    let is_open = match verdict {
-        Verdict::Unexplained | Verdict::PartlyExplained => true,
-        Verdict::Explained => is_left,
-        Verdict::NothingMissing | Verdict::CannotJudge => false,
-    };
-    if !is_open || search.options.rule != Rule::Protocol {
-        return Ok(Drafting::default());
+) -> Result<Option<Outcome>, DiscoverError> {
+    let Leaves { verdict, is_left, grown, against } = *leaves;
+    let may_be_drafted = is_open(verdict) || (verdict == Verdict::Explained && is_left);
+    if !may_be_drafted || search.options.rule != Rule::Protocol {
+        return Ok(None);
     }
     let known = &prepared.known.effects;
     let is_known = |name: &str| {
@@ -108,32 +87,36 @@ pub(super) fn drafted(
         let added = grown.parameters.terms.iter().skip(search.known_terms);
         closed.extend(added.map(|term| term.definition.stage()));
     }
-    let found = match search.draft(grown, &name, against, &closed)? {
-        Ok(found) => *found,
-        // Names explain all that matters, and nothing describes the rest better.
-        Err(_) if verdict == Verdict::Explained => return Ok(Drafting::default()),
-        Err(none) => return Ok(Drafting { draft: Some(Err(none)), ..Drafting::default() }),
+    let outcome = search.draft(grown, &name, against, &closed)?;
+    if verdict != Verdict::Explained {
+        return Ok(Some(outcome));
+    }
+    // Names explain all that matters. A second covariate may have brought a draft to another stage.
+    let stands = |found: &Drafted| {
+        !closed.contains(&found.draft.stage())
+            && sign_flip_p(&found.unseen_gains, FLIPS, search.options.seed) <= ALPHA
     };
-    if verdict == Verdict::Explained {
-        // A second covariate may bring it to another stage.
-        let acts_with_a_name = closed.contains(&found.draft.stage());
-        let gains = search.problem.heldout_gains(&grown.predicted, &found.at.predicted);
-        if acts_with_a_name || sign_flip_p(&gains, FLIPS, search.options.seed) > ALPHA {
-            return Ok(Drafting::default());
-        }
+    Ok(outcome.ok().filter(|found| stands(found)).map(Ok))
+}
+
+/// True if a verdict leaves something that a draft may explain.
+pub(super) const fn is_open(verdict: Verdict) -> bool {
+    match verdict {
+        Verdict::Unexplained | Verdict::PartlyExplained => true,
+        Verdict::Explained | Verdict::NothingMissing | Verdict::CannotJudge => false,
     }
-    let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest, alike } = found;
-    let of_draft = prepared.held(&at.parameters)?;
-    let closed = prepared.closed([of_grown, &of_draft], &at, floor)?;
-    if closed.is_some_and(|closed| closed.most < 0.0) {
-        return Ok(Drafting { draft: Some(Err(NoDraft::Further)), ..Drafting::default() });
-    }
-    let model = at.parameters.terms.last().map(|term| DraftModel {
-        name: term.definition.name,
-        with: at.parameters.clone(),
-        without: grown.parameters.clone(),
-    });
-    let found = DraftedEffect {
+}
+
+/// A draft with what it closes on the held-out presses of what a grown model leaves there.
+pub(super) fn opened(
+    prepared: &Prepared<'_>,
+    found: Drafted,
+    of_grown: &Residual,
+    floor: Floor,
+) -> Result<DraftedEffect, DiscoverError> {
+    let Drafted { draft, at, covariance, knots, p_value, ln_odds, folds, nearest, alike, .. } = found;
+    let of_draft = prepared.residual(&at.parameters)?;
+    Ok(DraftedEffect {
         draft,
         covariance,
         knots,
@@ -142,13 +125,12 @@ pub(super) fn drafted(
         folds,
         nearest,
         alike,
-        closed,
-        heldout_rms_before_counts: of_grown.rms_counts,
-        heldout_rms_after_counts: of_draft.rms_counts,
+        closed: prepared.closed([of_grown, &of_draft], &at, floor)?,
+        heldout_rms_before_counts: of_grown.heldout_rms_counts,
+        heldout_rms_after_counts: of_draft.heldout_rms_counts,
         base: super::conclude::base_of(prepared, &at.parameters),
         effects: at.parameters.effects()?,
-    };
-    Ok(Drafting { draft: Some(Ok(Box::new(found))), model, at: Some(at) })
+    })
 }
 
 /// What a new measurement says of a draft.
@@ -190,7 +172,7 @@ pub(crate) fn confirmation(
     let base = &prepared.base.parameters;
     let with = Term { values: vec![1.0], ..Term::neutral(draft) };
     let fitted = prepared.problem().fit_from(base.with(with), POLISH_ROUNDS)?;
-    let (before, after) = (prepared.held(base)?, prepared.held(&fitted.parameters)?);
+    let (before, after) = (prepared.residual(base)?, prepared.residual(&fitted.parameters)?);
     let floor = prepared.floor_of(&after);
     let last = fitted.parameters.terms.last().zip(fitted.errors.last());
     let (strength, error) = last.map_or((0.0, f64::NAN), |(term, errors)| (term.values[0], errors[0]));
@@ -198,8 +180,8 @@ pub(crate) fn confirmation(
         strength,
         strength_se: Some(error).filter(|error| error.is_finite()),
         closed: prepared.closed([&before, &after], &fitted, floor)?,
-        heldout_rms_before_counts: before.rms_counts,
-        heldout_rms_after_counts: after.rms_counts,
+        heldout_rms_before_counts: before.heldout_rms_counts,
+        heldout_rms_after_counts: after.heldout_rms_counts,
     })
 }
 

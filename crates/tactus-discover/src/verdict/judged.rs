@@ -1,4 +1,5 @@
-//! A grown model, judged: what tests say of what it leaves, how near it is to the held-out presses, the verdict, and the draft.
+//! A grown model, judged by the fitted presses: what tests say of what it leaves, which names are only the nearest, and the draft. Then the
+//! held-out presses are opened, for the figures and the verdict.
 //!
 //! A name may stand for what nobody has named, because a draft is tried only after all names. So each name has to hold its place beside
 //! the draft: the model without it is judged and drafted anew. If the draft is of the same kind, and the model with it as near to the fitted presses,
@@ -9,14 +10,15 @@ use std::sync::Arc;
 use super::closed::Closed;
 use super::confirmed::Confirmed;
 use super::discovery::{AddedEffect, Level, Verdict};
-use super::drafting::{Drafting, Leaves, drafted};
-use super::held_out::{HeldOutResidual, SEEN_NOISE};
+use super::drafting::{Leaves, drafted};
+use super::residual::{Presses, Residual, SEEN_NOISE};
+use super::structured::Structured;
 use crate::data::{DiscoverError, Floor, MISWIRED};
-use crate::fit::Prepared;
+use crate::fit::{Fitted, Prepared};
 use crate::progress::Stage;
 use crate::search::{
-    ALPHA, Against, Because, Contest, Equivalent, GivenUp, Left, Located, Rule, Scattered, Search,
-    last_words, names,
+    ALPHA, Against, Because, Contest, Drafted, Equivalent, GivenUp, Left, Located, NoDraft, Rule, Scattered,
+    Search, last_words, names,
 };
 
 /// Upper bound of what is structured, in noise units, for the verdict `Explained` whatever the tests say.
@@ -32,8 +34,6 @@ pub const DRIFTS: [&str; 2] = ["baseline-drift", "gain-drift"];
 pub(super) struct Judge<'a> {
     pub(super) prepared: &'a Prepared<'a>,
     pub(super) search: &'a Search<'a>,
-    /// The base model's residual on the held-out presses.
-    pub(super) of_base: &'a HeldOutResidual,
     /// What tests say of the base model.
     pub(super) p_value: f64,
     pub(super) equivalent: &'a Equivalent,
@@ -50,18 +50,27 @@ pub(super) struct Judged {
     pub(super) after: Arc<Located>,
     /// Whether its noise is the same everywhere, and each reading's own.
     pub(super) of_noise: [Scattered; 2],
-    pub(super) held: HeldOutResidual,
+    /// The least p-value of all tests, corrected.
+    p_value: f64,
+    pub(super) residual: Residual,
     pub(super) floor: Floor,
-    /// How far the base model and it are from the held-out presses.
+    /// What the fitted presses say.
+    verdict: Verdict,
+    /// Effects that it does not have, and why.
+    pub(super) given_up: Vec<GivenUp>,
+    /// The draft of what it leaves, or why there is none; `None` where nothing is left to draft.
+    pub(super) draft: Option<Result<Box<Drafted>, NoDraft>>,
+}
+
+/// What the held-out presses say of a judged model.
+pub(super) struct Opened {
+    /// How far the base model and it are from them.
     pub(super) levels: [Level; 2],
     /// How much of the gap it closes there; `None` without a gap.
     pub(super) closed: Option<Closed>,
     /// A test rejects it.
     pub(super) is_left: bool,
     pub(super) verdict: Verdict,
-    /// Effects that it does not have, and why.
-    pub(super) given_up: Vec<GivenUp>,
-    pub(super) drafting: Drafting,
 }
 
 impl Judge<'_> {
@@ -78,25 +87,33 @@ impl Judge<'_> {
     /// draft has to come nearer than they. Between presses a drift goes where it likes, which no model closes, so that none
     /// is asked beside it.
     fn without_far_names(&self, judged: Judged) -> Result<Judged, DiscoverError> {
+        let Self { prepared, search, equivalent, .. } = *self;
+        let grown = &judged.confirmed.grown;
+        let drifts = grown.parameters.terms.iter().any(|term| DRIFTS.contains(&term.definition.name));
+        if judged.verdict != Verdict::PartlyExplained || drifts {
+            return Ok(judged);
+        }
+        let Some((of_grown, of_estimates)) = prepared.by_folds(grown)? else { return Ok(judged) };
+        let closed = |less: &Fitted| -> Result<Option<Closed>, DiscoverError> {
+            let of_less = prepared.by_folds(less)?;
+            let closed = |(of_less, _): (Residual, f64)| {
+                prepared.closed_on([&of_less, &of_grown], Presses::Fitted, of_estimates, judged.floor)
+            };
+            Ok(of_less.and_then(closed))
+        };
         let is_far = |closed: &Closed| closed.most < NEAR_CLOSES;
-        let drifts =
-            judged.confirmed.grown.parameters.terms.iter().any(|term| DRIFTS.contains(&term.definition.name));
-        let is_asked = judged.verdict == Verdict::PartlyExplained && !drifts;
-        if !is_asked || !judged.closed.is_some_and(|closed| is_far(&closed)) {
+        if !closed(&prepared.base)?.is_some_and(|closed| is_far(&closed)) {
             return Ok(judged);
         }
         let mut far = Vec::new();
         for name in self.named(&judged.confirmed) {
-            let less = judged.confirmed.without(&[name], self.prepared, self.search, self.equivalent)?;
-            let of_less = self.prepared.held(&less.grown.parameters)?;
-            let both = [&of_less, &judged.held];
-            let closed = self.prepared.closed(both, &judged.confirmed.grown, judged.floor)?;
-            far.extend(closed.filter(is_far).map(|closed| (name, closed)));
+            let less = judged.confirmed.without(&[name], prepared, search, equivalent)?;
+            far.extend(closed(&less.grown)?.filter(is_far).map(|closed| (name, closed)));
         }
         let Some((nearest, _)) = far.first().copied() else { return Ok(judged) };
         let Judged { confirmed, mut given_up, .. } = judged;
         let gone: Vec<&str> = far.iter().map(|(name, _)| *name).collect();
-        let mut less = confirmed.without(&gone, self.prepared, self.search, self.equivalent)?;
+        let mut less = confirmed.without(&gone, prepared, search, equivalent)?;
         less.tentative.extend(confirmed.steps.into_iter().filter(|step| gone.contains(&step.effect)));
         let of_far = |(effect, Closed { share, .. })| GivenUp { effect, because: Because::Far(share) };
         given_up.extend(far.into_iter().map(of_far));
@@ -115,17 +132,15 @@ impl Judge<'_> {
 
     /// The model without a name, if what is drafted then acts by the same on the same, and explains as much as the name and the draft together.
     fn without_a_needless_name(&self, judged: &Judged) -> Result<Option<Judged>, DiscoverError> {
-        let Drafting { draft: Some(Ok(beside)), at: Some(both), .. } = &judged.drafting else {
-            return Ok(None);
-        };
+        let Some(Ok(beside)) = &judged.draft else { return Ok(None) };
         for name in self.named(&judged.confirmed) {
             let less = judged.confirmed.without(&[name], self.prepared, self.search, self.equivalent)?;
             let mut given_up = judged.given_up.clone();
             given_up.push(GivenUp { effect: name, because: Because::Draft });
             let less = self.judge(less, given_up, None)?;
-            if let Drafting { draft: Some(Ok(draft)), at: Some(alone), .. } = &less.drafting
-                && draft.is_like(beside)
-                && self.search.is_needless(draft.ln_odds, [alone, both])
+            if let Some(Ok(alone)) = &less.draft
+                && alone.is_like(beside)
+                && self.search.is_needless(alone.ln_odds, [&alone.at, &beside.at])
             {
                 return Ok(Some(less));
             }
@@ -140,33 +155,67 @@ impl Judge<'_> {
         gave_way: Vec<GivenUp>,
         against: Option<Against<'_>>,
     ) -> Result<Judged, DiscoverError> {
-        let Self { prepared, search, of_base, .. } = *self;
-        let Prepared { converter, faulty, .. } = prepared;
+        let Self { prepared, search, .. } = *self;
         let grown = &confirmed.grown;
         search.reporter.enter(Stage::LocatingLeft, "locating what remains");
         let left = search.left(grown)?;
         let after = search.locate(grown)?;
         let scattered = search.scattered(grown)?;
-        search.reporter.enter(Stage::Judging, "judging the held-out presses");
-        let held = prepared.held(&grown.parameters)?;
-        let of_noise = [scattered, prepared.own_noise(&held)];
-        let of_tests = [left.p_value, after.p_value, of_noise[0].p_value, of_noise[1].p_value];
-        let floor = prepared.floor_of(&held);
-        let levels = [of_base, &held].map(|held| prepared.level(held, floor));
-        let upper_noise = levels[1].structured.map_or(f64::INFINITY, |part| part.upper_noise);
+        search.reporter.enter(Stage::Judging, "judging what remains");
+        let residual = prepared.residual(&grown.parameters)?;
+        let of_noise = [scattered, prepared.own_noise(&residual)];
+        let floor = prepared.floor_of(&residual);
+        let p_value = least_p_value([left.p_value, after.p_value, of_noise[0].p_value, of_noise[1].p_value]);
+        let structured = prepared.structured(&residual, Presses::Fitted, floor);
+        // A model is never further than the base model from the presses that it was fitted to.
+        let evidence = self.evidence(grown, p_value, floor, structured, None);
+        let given_up = self.given_up(&confirmed, gave_way);
+        let refuted: Vec<&str> =
+            given_up.iter().filter(|one| one.is_refuted()).map(|one| one.effect).collect();
+        let against = against.unwrap_or(Against::Classes { refuted: &refuted });
+        let verdict = evidence.verdict();
+        let draft =
+            drafted(prepared, search, &Leaves { verdict, is_left: evidence.is_left, grown, against })?;
+        Ok(Judged { confirmed, left, after, of_noise, p_value, residual, floor, verdict, given_up, draft })
+    }
+
+    /// Opens the held-out presses for a judged model, beside the residual of the base model.
+    pub(super) fn opened(&self, judged: &Judged, of_base: &Residual) -> Result<Opened, DiscoverError> {
+        let Judged { confirmed, p_value, residual, floor, .. } = judged;
+        let grown = &confirmed.grown;
+        let levels = [of_base, residual].map(|residual| self.prepared.level(residual, *floor));
+        let closed =
+            if self.has_gap() { self.prepared.closed([of_base, residual], grown, *floor)? } else { None };
+        let evidence = self.evidence(grown, *p_value, *floor, levels[1].structured, closed);
+        Ok(Opened { levels, closed, is_left: evidence.is_left, verdict: evidence.verdict() })
+    }
+
+    /// True if a test rejects the base model.
+    fn has_gap(&self) -> bool {
+        self.p_value <= ALPHA
+    }
+
+    /// What the verdict depends on, of a model with this p-value.
+    fn evidence(
+        &self,
+        grown: &Fitted,
+        p_value: f64,
+        floor: Floor,
+        structured: Option<Structured>,
+        closed: Option<Closed>,
+    ) -> Evidence {
+        let Self { prepared, search, .. } = *self;
+        let upper_noise = structured.map_or(f64::INFINITY, |part| part.upper_noise);
         // Each test sees what repeats of rounding.
         let may_be_rounding = prepared.noise.may_be_rounding(upper_noise * upper_noise);
-        let is_left = least_p_value(of_tests) <= ALPHA && !may_be_rounding;
-        let has_gap = self.p_value <= ALPHA;
-        let closed = if has_gap { prepared.closed([of_base, &held], grown, floor)? } else { None };
         let is_named = !names(&grown.parameters, search.known_terms).is_empty();
         let tolerance_counts = search.options.tolerance_counts;
-        let evidence = Evidence {
-            is_named: is_named || converter.is_some() || !faulty.effects.is_empty(),
+        Evidence {
+            is_named: is_named || prepared.converter.is_some() || !prepared.faulty.effects.is_empty(),
             is_missing: search.options.rule == Rule::Protocol
-                && (has_gap || has_refused(self.contests))
+                && (self.has_gap() || has_refused(self.contests))
                 && (is_named || !may_be_rounding),
-            is_left,
+            is_left: p_value <= ALPHA && !may_be_rounding,
             closed_most: closed.map_or(f64::INFINITY, |closed| {
                 closed.share + closed.standard_error.unwrap_or(f64::INFINITY)
             }),
@@ -174,28 +223,7 @@ impl Judge<'_> {
             tolerance_noise: tolerance_counts
                 .zip(floor.rms_counts())
                 .map_or(0.0, |(tolerance, noise)| tolerance / noise),
-        };
-        let verdict = evidence.verdict();
-        let given_up = self.given_up(&confirmed, gave_way);
-        let refuted: Vec<&str> =
-            given_up.iter().filter(|one| one.is_refuted()).map(|one| one.effect).collect();
-        let against = against.unwrap_or(Against::Classes { refuted: &refuted });
-        let leaves = Leaves { verdict, is_left, grown, of_grown: &held, against };
-        let drafting = drafted(prepared, search, &leaves, floor)?;
-        Ok(Judged {
-            confirmed,
-            left,
-            after,
-            of_noise,
-            held,
-            floor,
-            levels,
-            closed,
-            is_left,
-            verdict,
-            given_up,
-            drafting,
-        })
+        }
     }
 
     /// Effects that were fitted and are not in a model, and why.
@@ -240,7 +268,7 @@ struct Evidence {
     is_missing: bool,
     /// A test rejects the grown model.
     is_left: bool,
-    /// The share of the gap on held-out presses that it closes, and a standard error; infinite if that is unknown. Below 0 the model is further
+    /// The share of the gap on unseen presses that it closes, and a standard error; infinite if that is unknown. Below 0 the model is further
     /// from them than the base model, which explains nothing, however little is left.
     closed_most: f64,
     /// Upper bound of what is structured in the grown model's residual.

@@ -23,7 +23,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::held_out::HeldOutResidual;
+use super::residual::Residual;
 use crate::data::turns;
 use crate::fit::Prepared;
 use crate::numbers::upper_tail;
@@ -86,7 +86,7 @@ impl Pattern {
 
 impl Prepared<'_> {
     /// Whether the noise of the fitted frames is each reading's own.
-    pub(super) fn own_noise(&self, held: &HeldOutResidual) -> Scattered {
+    pub(super) fn own_noise(&self, of: &Residual) -> Scattered {
         let (frames, elements) = (self.frames, self.frames.elements);
         let is_fitted = |frame: usize| !self.heldout.frames[frame];
         // A window begins as long after the tip came to rest as it lasts.
@@ -113,8 +113,8 @@ impl Prepared<'_> {
         let at_rest = AtRest {
             elements,
             cols: self.known.array.cols(),
-            residual: &held.residual,
-            signal: &held.signal,
+            residual: &of.counts,
+            signal: &of.signal,
             windows: &windows,
             singles: &singles,
             noise_counts: &self.noise.by_element_counts,

@@ -96,7 +96,7 @@ fn one_reading_far_out_is_seen_while_the_tool_goes_down() {
         // The third of five frames on the way down, of a press that is fitted.
         let frame =
             (0..ELEMENTS).map(|press| 30 * press + 7).find(|frame| !prepared.heldout.frames[*frame]).unwrap();
-        (prepared.own_noise(&prepared.held(&prepared.base.parameters).unwrap()), frame)
+        (prepared.own_noise(&prepared.residual(&prepared.base.parameters).unwrap()), frame)
     };
     let (whole, frame) = tested(&upon);
     assert!(whole.p_value > 0.01, "{whole:?}");

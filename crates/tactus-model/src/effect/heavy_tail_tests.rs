@@ -1,4 +1,4 @@
-use crate::effect::bench::{effect, fine, model, simulator, still, upon};
+use crate::effect::bench::{effect, fine, free, model, simulator, still, upon};
 use crate::{Array, Blur, Covering, ForwardModel, Psf, Response};
 
 fn tail(tail_share: f64, width_ratio: f64) -> crate::Effect {
@@ -13,6 +13,40 @@ fn a_point_is_spread_by_the_mixture() {
     for (element, r2) in [(0, 0.0), (1, 1.0), (4, 2.0), (8, 32.0)] {
         let want = 0.7 * gaussian(r2, 1.0) + 0.3 * gaussian(r2, 2.5);
         assert!((counts[element] / want - 1.0).abs() < 1e-5, "element {element}: {} {want}", counts[element]);
+    }
+}
+
+#[test]
+fn a_point_is_spread_by_a_mixture_of_any_gaussians() {
+    let one = fine(free("heavy-tail", [], &[1.5, 2.5, 4.0], &[0.2, 0.0, 0.3]));
+    let counts = still(&one, upon(&one, 0, 1.0));
+    let gaussian = |r2: f64, sigma: f64| (-0.5 * r2 / sigma.powi(2)).exp() / sigma.powi(2);
+    for (element, r2) in [(0, 0.0), (1, 1.0), (4, 2.0), (8, 32.0)] {
+        let want = 0.5 * gaussian(r2, 1.0) + 0.2 * gaussian(r2, 1.5) + 0.3 * gaussian(r2, 4.0);
+        assert!((counts[element] / want - 1.0).abs() < 1e-5, "element {element}: {} {want}", counts[element]);
+    }
+}
+
+#[test]
+fn shares_of_more_than_all_leave_nothing_in_the_core() {
+    let one = fine(free("heavy-tail", [], &[1.5, 3.0], &[0.6, 0.9]));
+    let same = fine(free("heavy-tail", [], &[1.5, 3.0], &[0.4, 0.6]));
+    let tip_mm = upon(&one, 0, 1.0);
+    for (got, want) in still(&one, tip_mm).iter().zip(still(&same, tip_mm)) {
+        assert!((got - want).abs() < 1e-9 * want, "{got} {want}");
+    }
+}
+
+/// Student's family is a mean over Gaussians of which the precisions have a gamma density: `(1 + r^2 / 2)^-2` of those with the density `exp(-1 / sigma^2)`.
+#[test]
+fn a_power_law_is_a_sum_of_a_few_gaussians() {
+    let ratios: Vec<f64> = (0..10).map(|k| 0.45 * 1.6_f64.powi(k)).collect();
+    let shares: Vec<f64> = ratios.iter().map(|ratio| ratio.powi(-2) * (-ratio.powi(-2)).exp()).collect();
+    let one = fine(free("heavy-tail", [], &ratios, &shares));
+    let counts = still(&one, upon(&one, 0, 1.0));
+    for (element, r2) in [(1, 1.0), (4, 2.0), (8, 32.0)] {
+        let (got, want) = (counts[element] / counts[0], (1.0_f64 + 0.5 * r2).powi(-2));
+        assert!((got / want - 1.0).abs() < 0.03, "element {element}: {got} {want}");
     }
 }
 

@@ -31,6 +31,8 @@ pub(super) struct Curve {
     pub(super) values: DVector<f64>,
     /// The products of the columns, in units of the noise's variance.
     pub(super) gram: DMatrix<f64>,
+    /// By how much a curve that is fitted to the other folds is nearer to the presses of each, block by block.
+    pub(super) unseen_gains: Vec<f64>,
 }
 
 /// A curve as a law or a table.

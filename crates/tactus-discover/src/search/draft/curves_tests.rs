@@ -12,6 +12,7 @@ fn curve(law: &Law, error: f64) -> Curve {
     Curve {
         values: DVector::from_iterator(AT.len(), AT.iter().map(|at| law.value(&[*at]))),
         gram: DMatrix::identity(AT.len(), AT.len()) / (error * error),
+        unseen_gains: Vec::new(),
     }
 }
 

@@ -1,4 +1,7 @@
-//! A model's residual: how large it is on the held-out presses, and how much of that is structured.
+//! A model's residual: how large it is on presses, and how much of that is structured.
+//!
+//! What is decided is decided by the fitted presses, and the held-out ones are opened for the figures. Where a decision needs presses that a fit
+//! has not seen, each fold of the fitted presses is predicted by a fit to the others ([`Prepared::by_folds`]).
 
 use std::ops::Range;
 
@@ -6,19 +9,26 @@ use super::closed::{Closed, closed};
 use super::discovery::{ElementGap, Level};
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, Noise, QUIETEST, turns};
-use crate::fit::{Fitted, LOUD, Parameters, Prepared};
+use crate::fit::{ByFolds, Fitted, LOUD, Parameters, Prepared};
 
 /// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests.
 pub(super) const SEEN_NOISE: f64 = 2.0;
 
-/// The residual of a model on the held-out frames.
-pub(super) struct HeldOutResidual {
-    /// Root mean square.
-    pub(super) rms_counts: f64,
-    /// Root mean square for each element.
+/// Presses of which a residual is examined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Presses {
+    Fitted,
+    HeldOut,
+}
+
+/// The residual of a model.
+pub(super) struct Residual {
+    /// Root mean square on the held-out frames.
+    pub(super) heldout_rms_counts: f64,
+    /// The same for each element.
     pub(super) elements_rms_counts: Vec<f64>,
     /// For all frames, fitted and held out: frame by frame, element by element.
-    pub(super) residual: Vec<f32>,
+    pub(super) counts: Vec<f32>,
     /// As predicted, in counts, for the same.
     pub(super) signal: Vec<f32>,
 }
@@ -30,7 +40,7 @@ pub(super) fn closed_share([before, after]: [f64; 2], noise: f64) -> Option<f64>
     (gap > 0.0).then(|| ((before * before - after * after) / gap).min(1.0))
 }
 
-impl HeldOutResidual {
+impl Residual {
     /// The residual of each element, and that of a grown model.
     pub(super) fn elements_beside(&self, grown: &Self) -> Vec<ElementGap> {
         let elements = self.elements_rms_counts.iter().zip(&grown.elements_rms_counts);
@@ -41,8 +51,8 @@ impl HeldOutResidual {
 }
 
 impl Prepared<'_> {
-    /// The residual of a model on the held-out frames.
-    pub(super) fn held(&self, parameters: &Parameters) -> Result<HeldOutResidual, DiscoverError> {
+    /// The residual of a model.
+    pub(super) fn residual(&self, parameters: &Parameters) -> Result<Residual, DiscoverError> {
         let Self { frames, heldout, whole, .. } = self;
         let predicted = self.predictor(whole).predict(parameters)?;
         let elements = frames.elements;
@@ -71,19 +81,38 @@ impl Prepared<'_> {
         }
         let baselines = whole.run.iter().flat_map(|run| &parameters.baseline[*run]);
         signal.iter_mut().zip(baselines).for_each(|(of, zero)| *of -= zero);
-        Ok(HeldOutResidual {
-            rms_counts: mean.sqrt(),
+        Ok(Residual {
+            heldout_rms_counts: mean.sqrt(),
             elements_rms_counts: (0..elements)
                 .map(|element| if weightless(element) { f64::NAN } else { (squares[element] / count).sqrt() })
                 .collect(),
-            residual,
+            counts: residual,
             signal: signal.into_iter().map(single).collect(),
         })
     }
 
+    /// The residual of a fitted model whose fitted presses are predicted by fits to other presses, and the mean square that the errors of their
+    /// numbers leave there. `None` if the model has a random walk, which has a state of its own in every press.
+    pub(super) fn by_folds(&self, fitted: &Fitted) -> Result<Option<(Residual, f64)>, DiscoverError> {
+        let Some(ByFolds { moved, estimation_error }) = self.problem().by_folds(fitted)? else {
+            return Ok(None);
+        };
+        let mut residual = self.residual(&fitted.parameters)?;
+        let elements = self.frames.elements;
+        for (frames, moved) in self.bins.first.windows(2).zip(moved.chunks_exact(elements)) {
+            let readings = &mut residual.counts[frames[0] * elements..frames[1] * elements];
+            for (left, moved) in readings.iter_mut().zip(moved.iter().cycle()) {
+                #[expect(clippy::cast_possible_truncation, reason = "as precise as counts are")]
+                let single = *moved as f32;
+                *left -= single;
+            }
+        }
+        Ok(Some((residual, estimation_error)))
+    }
+
     /// The floor given the grown model. Before a tone is in the model, it looks like noise.
-    pub(super) fn floor_of(&self, grown: &HeldOutResidual) -> Floor {
-        let left = Noise::in_time(self.frames, &grown.residual, &self.still, self.step_counts);
+    pub(super) fn floor_of(&self, grown: &Residual) -> Floor {
+        let left = Noise::in_time(self.frames, &grown.counts, &self.still, self.step_counts);
         let is_weightless = |element| self.faulty.is_weightless(element);
         let left = left.map(|(left, freedom)| (left.without(is_weightless), freedom));
         match (self.floor, left) {
@@ -95,34 +124,34 @@ impl Prepared<'_> {
     }
 
     /// How far a model is from the held-out frames.
-    pub(super) fn level(&self, held: &HeldOutResidual, floor: Floor) -> Level {
-        let in_noise = |noise_counts: f64| (held.rms_counts / noise_counts).powi(2);
+    pub(super) fn level(&self, of: &Residual, floor: Floor) -> Level {
+        let in_noise = |noise_counts: f64| (of.heldout_rms_counts / noise_counts).powi(2);
         Level {
-            heldout_rms_counts: held.rms_counts,
+            heldout_rms_counts: of.heldout_rms_counts,
             heldout_chi2: floor.rms_counts().map(in_noise),
-            structured: self.structured(held, floor),
+            structured: self.structured(of, Presses::HeldOut, floor),
         }
     }
 
-    /// The structured part of a residual on held-out presses: among all readings or among those with a signal.
-    fn structured(&self, held: &HeldOutResidual, floor: Floor) -> Option<Structured> {
+    /// The structured part of a residual on presses: among all readings or among those with a signal.
+    pub(super) fn structured(&self, of: &Residual, presses: Presses, floor: Floor) -> Option<Structured> {
         let (elements, turns) = (self.frames.elements, self.turns());
         let is_known = |place: usize| !turns[place / elements];
         let noise_counts = &self.noise.by_element_counts;
         let has_signal =
-            |place: usize| f64::from(held.signal[place].abs()) > LOUD * noise_counts[place % elements];
+            |place: usize| f64::from(of.signal[place].abs()) > LOUD * noise_counts[place % elements];
         let parts = [
-            self.structured_among(held, floor, is_known),
-            self.structured_among(held, floor, |place| is_known(place) && has_signal(place))
+            self.structured_among(of, presses, floor, is_known),
+            self.structured_among(of, presses, floor, |place| is_known(place) && has_signal(place))
                 .map(|part| Structured { with_signal: true, ..part }),
         ];
         parts.into_iter().flatten().max_by(|one, other| one.upper_noise.total_cmp(&other.upper_noise))
     }
 
     /// A warning if much is structured in the frames that are not judged.
-    pub(super) fn not_judged(&self, held: &HeldOutResidual, floor: Floor) -> Option<String> {
+    pub(super) fn not_judged(&self, of: &Residual, floor: Floor) -> Option<String> {
         let (elements, turns) = (self.frames.elements, self.turns());
-        let part = self.structured_among(held, floor, |place| turns[place / elements])?;
+        let part = self.structured_among(of, Presses::HeldOut, floor, |place| turns[place / elements])?;
         (part.rms_noise > SEEN_NOISE).then(|| {
             format!(
                 "frames at which the stage starts or stops near the surface are not judged, because its position between two reports \
@@ -140,34 +169,47 @@ impl Prepared<'_> {
     /// How much of what a model leaves on held-out presses another model, the fitted one, closes.
     pub(super) fn closed(
         &self,
-        [before, after]: [&HeldOutResidual; 2],
+        both: [&Residual; 2],
         fitted: &Fitted,
         floor: Floor,
     ) -> Result<Option<Closed>, DiscoverError> {
-        let (elements, turns) = (self.frames.elements, self.turns());
         let of_estimates = self.problem().estimation_error(fitted)?.unwrap_or(0.0);
+        Ok(self.closed_on(both, Presses::HeldOut, of_estimates, floor))
+    }
+
+    /// The same on presses; `of_estimates` is what the errors of the second model's numbers leave there.
+    pub(super) fn closed_on(
+        &self,
+        [before, after]: [&Residual; 2],
+        presses: Presses,
+        of_estimates: f64,
+        floor: Floor,
+    ) -> Option<Closed> {
+        let (elements, turns) = (self.frames.elements, self.turns());
         let of_before = |before: &Readings<'_>| {
             let of_both = |after: &Readings<'_>| {
                 closed([before, after], of_estimates, |place| !turns[place / elements])
             };
-            self.on_readings(after, floor, of_both)?
+            self.on_readings(after, presses, floor, of_both)?
         };
-        Ok(self.on_readings(before, floor, of_before).flatten())
+        self.on_readings(before, presses, floor, of_before).flatten()
     }
 
     fn structured_among(
         &self,
-        held: &HeldOutResidual,
+        of: &Residual,
+        presses: Presses,
         floor: Floor,
         among: impl Fn(usize) -> bool,
     ) -> Option<Structured> {
-        self.on_readings(held, floor, |readings| readings.structured(among))?
+        self.on_readings(of, presses, floor, |readings| readings.structured(among))?
     }
 
-    /// Something of a residual's readings on held-out presses; `None` without a floor.
+    /// Something of a residual's readings on presses; `None` without a floor.
     fn on_readings<T>(
         &self,
-        held: &HeldOutResidual,
+        of: &Residual,
+        presses: Presses,
         floor: Floor,
         something: impl FnOnce(&Readings<'_>) -> T,
     ) -> Option<T> {
@@ -177,9 +219,9 @@ impl Prepared<'_> {
         let lag = self.noise.memory_frames();
         Some(something(&Readings {
             elements: self.frames.elements,
-            residual: &held.residual,
-            signal: &held.signal,
-            presses: &self.heldout_presses(),
+            residual: &of.counts,
+            signal: &of.signal,
+            presses: &self.frames_of(presses),
             unit_counts: &noise_counts.iter().map(|rms| rms.max(QUIETEST * rms_counts)).collect::<Vec<_>>(),
             noise_counts: &noise_counts,
             lag,
@@ -189,15 +231,13 @@ impl Prepared<'_> {
         }))
     }
 
-    /// Frames of each held-out press and of each held-out rest between presses.
-    fn heldout_presses(&self) -> Vec<Range<usize>> {
+    /// Frames of each press, and of each rest between presses.
+    fn frames_of(&self, which: Presses) -> Vec<Range<usize>> {
         let (frames, held) = (self.frames, &self.heldout.frames);
+        let is_among = |press: &Range<usize>| held[press.start] == (which == Presses::HeldOut);
         let key = |frame: usize| (held[frame], self.whole.run[frame], frames.press[frame]);
         let all: Vec<usize> = (0..frames.len()).collect();
         let presses = all.chunk_by(|one, next| key(*one) == key(*next));
-        presses
-            .filter_map(|press| Some(*press.first()?..press.last()? + 1))
-            .filter(|press| held[press.start])
-            .collect()
+        presses.filter_map(|press| Some(*press.first()?..press.last()? + 1)).filter(is_among).collect()
     }
 }
