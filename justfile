@@ -348,6 +348,7 @@ discovery-evidence: bench-discovery
         --with=--ablation --with=bic
     target/dist/tactus-bench evidence run --seeds sealed
     target/dist/tactus-bench evidence separate --seeds sealed
+    target/dist/tactus-bench evidence curves --seeds sealed
     target/dist/tactus-bench evidence score --seeds sealed --ablation target/evidence/sealed/work --costs target/evidence/costs.json \
         --document docs/discovery-evidence.md --images docs/images
 
@@ -355,6 +356,22 @@ discovery-evidence: bench-discovery
 discovery-active:
     cargo build --profile dist --package tactus --package tactus-bench
     target/dist/tactus-bench evidence active --document docs/discovery-evidence.md
+
+# What new data of the same sensors say of the drafts of 40 tuning sets, and how near the drafts' curves come, some ten minutes on two cores. The
+# results are in a folder for each build, so a rerun goes on where it ended: docs/discovery-evidence.md.
+discovery-confirm:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    cargo build --profile dist --package tactus --package tactus-bench
+    at=target/evidence/confirm/$(sha256sum target/dist/tactus | cut -c 1-12)
+    evidence() {
+        target/dist/tactus-bench evidence "$1" --campaign outside --only z40 --work "$at/work" --labels "$at/labels" "${@:2}"
+    }
+    evidence run > /dev/null
+    evidence curves
+    evidence score > /dev/null
+    grep -A 40 '^## Drafts' "$at/work/evidence.md"
+    evidence confirm --document docs/discovery-evidence.md
 
 # One table for work on the method, of 54 tuning sets, with the programs of `just build`; misses are in target/evidence/quick/work/misses.txt.
 discovery-quick: build

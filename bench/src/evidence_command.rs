@@ -7,9 +7,9 @@ use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand};
 use tactus_bench::evidence::{
     self, Ablation, Bounds, Campaign, Costs, Counts, Form, Observed, Outcome, Places, Planned, Scores, Seeds,
-    Size, Sizes, TWINS, Timing, Workflow, ablations, campaigns, constants_table, contests, contests_table,
-    document, forms_table, into_document, misses, moments, pictures, progress_table, read, run, separate,
-    summary, twins_table,
+    Size, Sizes, TWINS, Timing, Workflow, ablations, campaigns, cases, confirm, confirm_table,
+    constants_table, contests, contests_table, curves, document, forms_table, into_document, misses, moments,
+    pictures, progress_table, read, run, separate, summary, twins_table,
 };
 use tactus_work::write_whole;
 
@@ -30,7 +30,13 @@ enum Part {
     Score(WhichArgs),
     /// Writes into the labels of sets that have been run how far their physics is from the nearest wrong effect; continues an
     /// interrupted run. Workers that have the same folders share the sets.
-    Separate(SeparateArgs),
+    Separate(LabelArgs),
+    /// Computes how near the curves of drafts come to the hidden physics, on paths that the sets that have been run do not have; continues an
+    /// interrupted run. Workers that have the same folders share the sets.
+    Curves(LabelArgs),
+    /// Compares the drafts of the sets that have been run with new data of the same sensors: with the hidden physics, without it, and with
+    /// another one in its place; continues an interrupted run. Workers that have the same folders share the sets.
+    Confirm(ConfirmArgs),
     /// Prints what each value of the search's constants would do on the tuning sets that have been run.
     Constants(WhichArgs),
     /// Prints how near rivals without a name come to the effects that are named in the tuning sets that have been run.
@@ -106,9 +112,20 @@ struct RunArgs {
 }
 
 #[derive(Debug, Args)]
-struct SeparateArgs {
+struct LabelArgs {
     #[command(flatten)]
     which: WhichArgs,
+    #[command(flatten)]
+    worker: WorkerArgs,
+}
+
+#[derive(Debug, Args)]
+struct ConfirmArgs {
+    #[command(flatten)]
+    which: WhichArgs,
+    /// The program that confirms drafts.
+    #[arg(long, default_value = "target/dist/tactus")]
+    tactus: PathBuf,
     #[command(flatten)]
     worker: WorkerArgs,
 }
@@ -155,7 +172,9 @@ impl EvidenceArgs {
         match self.part {
             Part::Run(args) => args.run(),
             Part::Score(which) => which.score_all(),
-            Part::Separate(args) => args.run(),
+            Part::Separate(args) => args.separate(),
+            Part::Curves(args) => args.curves(),
+            Part::Confirm(args) => args.run(),
             Part::Constants(which) => which.constants(),
             Part::Contests(which) => which.contests(),
             Part::Progress(which) => which.progress(),
@@ -227,12 +246,36 @@ impl RunArgs {
     }
 }
 
-impl SeparateArgs {
-    fn run(&self) -> Result<()> {
+impl LabelArgs {
+    fn separate(&self) -> Result<()> {
         self.which.check_seeds()?;
         let (sets, places) = (self.which.sets(), self.which.places());
         let claims = places.work.join("claims").join("separation");
         self.worker.work("sets", claims, |worker, progress| separate(&sets, &places, worker, progress))
+    }
+
+    fn curves(&self) -> Result<()> {
+        self.which.check_seeds()?;
+        let (sets, places) = (self.which.sets(), self.which.places());
+        let claims = places.work.join("claims").join("curves");
+        self.worker.work("sets", claims, |worker, progress| curves(&sets, &places, worker, progress))
+    }
+}
+
+impl ConfirmArgs {
+    fn run(&self) -> Result<()> {
+        self.which.check_seeds()?;
+        let (sets, places) = (self.which.sets(), self.which.places());
+        let claims = places.work.join("claims").join("confirmation");
+        self.worker.work("sets", claims, |worker, progress| {
+            confirm(&sets, &places, &self.tactus, worker, progress)
+        })?;
+        let text = confirm_table(&cases(&sets, &places)?);
+        println!("{text}");
+        match &self.which.document {
+            Some(path) => into(path, evidence::Part::Confirm, &text),
+            None => Ok(()),
+        }
     }
 }
 

@@ -91,22 +91,14 @@ struct Unexplained {
 #[derive(Debug, Deserialize)]
 struct GivenUp {
     effect: String,
-    because: String,
-}
-
-impl GivenUp {
     /// The share that it closes, if that is why it was given up.
-    fn closed(&self) -> Option<f64> {
-        let (_, rest) = self.because.split_once("comes nearest, and closes ")?;
-        let (percent, _) = rest.split_once(" %")?;
-        Some(percent.parse::<f64>().ok()? / 100.0)
-    }
+    closed_share: Option<f64>,
 }
 
 impl Told {
     /// The only name, with what it closes, where the verdict asks for that: names explain a part, and no drift is among them.
     fn only_name(&self) -> Option<(&str, f64)> {
-        let mut far = self.given_up.iter().filter_map(|one| Some((one.effect.as_str(), one.closed()?)));
+        let mut far = self.given_up.iter().filter_map(|one| Some((one.effect.as_str(), one.closed_share?)));
         match (&self.steps[..], far.next(), far.next()) {
             ([], Some(only), None) => Some(only),
             ([only], None, _) => {

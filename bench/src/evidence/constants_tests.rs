@@ -86,8 +86,7 @@ fn what_a_name_closes_is_asked_where_it_explains_a_part_and_is_no_drift() {
     assert_eq!(observed.closes, []);
     observed.add(&["imprint"], &partly("imprint"));
     observed.add(&[], &partly("relaxation"));
-    let because = "it comes nearest, and closes 35 % of the gap on held-out presses: an effect closes more";
-    let given_up = vec![GivenUp { effect: "relaxation".into(), because: because.into() }];
+    let given_up = vec![GivenUp { effect: "relaxation".into(), closed_share: Some(0.35) }];
     observed.add(&[], &Told { given_up, ..told(Vec::new()) });
     assert_eq!([0.5, 0.9, 0.95].map(|share| observed.far_at(share)), [[0, 1], [0, 1], [1, 2]]);
     assert!(constants_table(&observed).contains("NEAR_CLOSES, 1 right and 2 wrong names alone"));

@@ -9,7 +9,7 @@ use tactus_model::effect::REGISTRY;
 
 use super::ablation::Ablation;
 use super::campaign::Campaign;
-use super::drafts::{DraftScore, DraftScores};
+use super::drafts::{CurveScore, DraftScore, DraftScores};
 use super::outcome::Outcome;
 use super::rate::Rate;
 use super::score::{APART, Band, ORACLE_LEVEL, OutsideScore, Scores, SetSize, Several, Shrink, Spread};
@@ -24,6 +24,8 @@ pub enum Part {
     Active,
     /// The forms of hidden physics.
     Forms,
+    /// Drafts that new data confirm or refute.
+    Confirm,
 }
 
 impl Part {
@@ -32,6 +34,7 @@ impl Part {
             Self::Evidence => ["<!-- evidence: begin -->", "<!-- evidence: end -->"],
             Self::Active => ["<!-- active: begin -->", "<!-- active: end -->"],
             Self::Forms => ["<!-- forms: begin -->", "<!-- forms: end -->"],
+            Self::Confirm => ["<!-- confirm: begin -->", "<!-- confirm: end -->"],
         }
     }
 }
@@ -395,7 +398,8 @@ fn drafts(f: &mut fmt::Formatter<'_>, scores: &DraftScores) -> fmt::Result {
         f,
         "\n## Drafts\n\nA draft is right if its stage and its first covariate are those of the hidden physics. All sets are in the denominators, \
          those included in which an effect was named or nothing was seen. Physics that is drawn anew for each reading has no mean to draft; it is \
-         drafted in {} of {} sets. Something is drafted in {} of {} sets without hidden physics, and in {} of {} with one effect of the library.\n\n| physics | sets | drafted | right stage and covariate | right, and 70 % closed |\n|---|---|---|---|---|",
+         drafted in {} of {} sets. Something is drafted in {} of {} sets without hidden physics, and in {} of {} with one effect of the library. The error \
+         of a curve is on a path that the set does not have; it is computed after the runs.\n\n| physics | sets | drafted | right stage and covariate | right, and 70 % closed | right, and curve within 10 % | error of right curves, median |\n|---|---|---|---|---|---|---|",
         scores.of_single.hits,
         scores.of_single.of,
         scores.of_nothing.hits,
@@ -403,10 +407,16 @@ fn drafts(f: &mut fmt::Formatter<'_>, scores: &DraftScores) -> fmt::Result {
         scores.of_named.hits,
         scores.of_named.of
     )?;
-    for (physics, DraftScore { drafted, right, right_and_closed }) in &scores.outside {
+    for (physics, DraftScore { drafted, right, right_and_closed, curves }) in &scores.outside {
+        let [near, error] = curves.map_or_else(
+            || ["-".to_owned(), "-".to_owned()],
+            |CurveScore { right_and_near, median_error }| {
+                [percent(right_and_near.share), percent(median_error.unwrap_or(f64::NAN))]
+            },
+        );
         writeln!(
             f,
-            "| {physics} | {} | {} | {} | {} |",
+            "| {physics} | {} | {} | {} | {} | {near} | {error} |",
             drafted.of,
             percent(drafted.share),
             percent(right.share),

@@ -5,12 +5,15 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use tactus_hidden::DraftTruth;
 
+use super::curves::Curve;
 use super::outcome::Outcome;
-use super::rate::Rate;
+use super::rate::{Rate, quantile};
 use super::score::by_physics;
 
 /// A draft closes a set if it closes this share of what was left on held-out presses.
 const CLOSED_LEAST: f64 = 0.7;
+/// The curve of a draft is near if its relative error is at most this.
+const NEAR_MOST: f64 = 0.1;
 
 /// The draft of a report.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -21,6 +24,9 @@ pub struct Draft {
     pub covariates: Vec<Covariate>,
     /// Share of what was left on held-out presses that it closes.
     pub closed_share: Option<f64>,
+    /// How near its curve comes, if that is computed.
+    #[serde(skip)]
+    pub curve: Option<Curve>,
 }
 
 /// A covariate of a draft.
@@ -39,6 +45,17 @@ pub struct DraftScore {
     pub right: Rate,
     /// It is right and closes most of what was left.
     pub right_and_closed: Rate,
+    /// Curves of right drafts; `None` if that of any is not computed.
+    pub curves: Option<CurveScore>,
+}
+
+/// How near the curves of right drafts come to the hidden physics.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct CurveScore {
+    /// The draft is right and its curve is near; of all sets.
+    pub right_and_near: Rate,
+    /// Median of the relative errors of right drafts.
+    pub median_error: Option<f64>,
 }
 
 /// Drafts by purpose of the sets.
@@ -56,7 +73,7 @@ pub struct DraftScores {
 
 impl Draft {
     /// True if it is a right draft of a physics.
-    fn is_right(&self, physics: &str) -> bool {
+    pub(super) fn is_right(&self, physics: &str) -> bool {
         let covariate = self.covariates.first().map(|first| first.covariate.as_str());
         DraftTruth::find(physics).is_some_and(|truth| {
             truth.stages.contains(&self.stage.as_str())
@@ -79,7 +96,22 @@ impl DraftScore {
             drafted: Rate::of(sets, |set| set.draft.is_some()),
             right: Rate::of(sets, |set| is_right(set)),
             right_and_closed: Rate::of(sets, |set| is_right(set) && closes(set)),
+            curves: CurveScore::of(sets, is_right),
         }
+    }
+}
+
+impl CurveScore {
+    fn of(sets: &[&Outcome], is_right: impl Fn(&Outcome) -> bool) -> Option<Self> {
+        let right = sets.iter().filter(|set| is_right(set));
+        let error = |set: &&Outcome| {
+            let curve = set.draft.as_ref()?.curve.as_ref()?;
+            // A draft of what does not show on the other path is not near.
+            Some(curve.error.unwrap_or(f64::INFINITY))
+        };
+        let errors: Vec<f64> = right.map(error).collect::<Option<_>>()?;
+        let near = errors.iter().filter(|error| **error <= NEAR_MOST).count();
+        Some(Self { right_and_near: Rate::new(near, sets.len()), median_error: quantile(errors, 0.5) })
     }
 }
 

@@ -7,6 +7,7 @@ use serde::{Deserialize, de::DeserializeOwned};
 use tactus_sets::Label;
 
 use super::campaign::{Campaign, Planned};
+use super::curves::Curve;
 use super::drafts::{Covariate, Draft};
 use super::run::{Places, Ran};
 use super::score::{SHRINK_ERROR_MAX, Z_NAMEABLE};
@@ -236,7 +237,11 @@ fn one(set: &Planned, places: &Places) -> Result<Outcome> {
     let ran: Ran = parsed(&places.ran(&set.id))?;
     let report = places.report(&set.id);
     let report: Option<DiscoveryReport> = report.exists().then(|| parsed(&report)).transpose()?;
-    Ok(outcome(set, &label, &ran, report))
+    let mut outcome = outcome(set, &label, &ran, report);
+    if let Some(draft) = &mut outcome.draft {
+        draft.curve = Curve::read(&set.id, places)?;
+    }
+    Ok(outcome)
 }
 
 fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryReport>) -> Outcome {
@@ -277,7 +282,7 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryRepo
         draft: report.as_ref().and_then(|report| {
             let Drafted { stage, covariates, closed_share } = report.draft.as_ref()?;
             let (covariates, closed_share) = (covariates.clone(), *closed_share);
-            Some(Draft { stage: stage.clone()?, covariates, closed_share })
+            Some(Draft { stage: stage.clone()?, covariates, closed_share, curve: None })
         }),
         seconds: ran.processor_s,
         peak_mib: ran.peak_mib,

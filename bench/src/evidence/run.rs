@@ -76,6 +76,16 @@ impl Places {
         ["sets", "residuals"].map(|folder| self.work.join(folder).join(format!("{id}.parquet")))
     }
 
+    /// The draft of a set, if there is one.
+    pub fn draft(&self, id: &str) -> PathBuf {
+        self.work.join("drafts").join(format!("{id}.toml"))
+    }
+
+    /// The grown model of a set that has a draft.
+    pub fn model(&self, id: &str) -> PathBuf {
+        self.work.join("models").join(format!("{id}.toml"))
+    }
+
     /// When each stage of a set's discovery began.
     pub fn stages(&self, id: &str) -> PathBuf {
         self.work.join("stages").join(format!("{id}.jsonl"))
@@ -84,6 +94,16 @@ impl Places {
     /// The label of a set.
     pub fn label(&self, id: &str) -> PathBuf {
         self.labels.join(format!("{id}.json"))
+    }
+
+    /// The [`Curve`](super::Curve) of a set's draft.
+    pub fn curve(&self, id: &str) -> PathBuf {
+        self.labels.join("curves").join(format!("{id}.json"))
+    }
+
+    /// The [`Confirmed`](super::Confirmed) of a set's draft.
+    pub fn confirmed(&self, id: &str) -> PathBuf {
+        self.labels.join("confirmed").join(format!("{id}.json"))
     }
 }
 
@@ -139,6 +159,8 @@ impl Discovery {
     const TABLE: &str = "set.parquet";
     /// The folder of the results.
     const OUT: &str = "out";
+    /// The draft in it.
+    const DRAFT: &str = "draft-1.toml";
     const STAGES: &str = "stages";
 
     fn path(&self, name: &str) -> PathBuf {
@@ -217,6 +239,10 @@ impl Work for Discoveries<'_> {
         if found.exists() {
             moved(&found, &places.report(&set.id))?;
             moved(&discovery.path(Discovery::STAGES), &places.stages(&set.id))?;
+            if out.join(Discovery::DRAFT).exists() {
+                moved(&out.join(Discovery::DRAFT), &places.draft(&set.id))?;
+                moved(&out.join("model.toml"), &places.model(&set.id))?;
+            }
             if workflow.keeps_tables {
                 let [kept_table, residuals] = places.tables(&set.id);
                 moved(&discovery.path(Discovery::TABLE), &kept_table)?;

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use tactus_hidden::{Definition, Dose};
 
 use crate::nearest::ClassFits;
 use crate::noise::Noise;
 use crate::plan::Plan;
+use crate::recipe::RecipeError;
 
 /// The truth of a set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,6 +67,13 @@ pub struct PhysicsLabel {
 }
 
 impl PhysicsLabel {
+    /// The physics at its strength.
+    pub(crate) fn dose(&self) -> Result<Dose, RecipeError> {
+        let physics =
+            Definition::find(&self.id).ok_or_else(|| RecipeError::UnknownPhysics(self.id.clone()))?;
+        Ok(Dose { physics, strength: self.strength, seed: self.seed })
+    }
+
     /// The fits of the library's effects to it, if they are computed.
     pub fn class_fits(&self) -> Option<ClassFits> {
         let effects = self.z_of_effects.clone();

@@ -21,9 +21,11 @@
 
 pub mod plan;
 
+mod anew;
 mod label;
 mod nearest;
 mod noise;
+mod oracle;
 mod recipe;
 mod separation;
 mod set;

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::{Definition, ParameterKind, REGISTRY};
-use tactus_model::{Effect, Images, Moment, Pipeline, Simulator};
+use tactus_model::{Effect, Images};
 
-use crate::recipe::SeparationOracle;
+use crate::oracle::SeparationOracle;
 use crate::separation::Separation;
 
 /// How far each effect of the library, fitted to the counts, stays from them.
@@ -64,7 +64,7 @@ const NEAREST: usize = 3;
 const STEPS: usize = 8;
 /// A fit ends when a step reduces z by less than this share.
 const GAIN_LEAST: f64 = 1e-3;
-const IMAGES_MAX: usize = 60_000;
+pub(crate) const IMAGES_MAX: usize = 60_000;
 /// Times at which shapes start, in s.
 const TIMES_S: [f64; 3] = [0.3, 3.0, 30.0];
 
@@ -180,30 +180,8 @@ impl<'a> Fitter<'a> {
     fn counts(&self, guess: &Guess) -> Option<Vec<f64>> {
         let names = guess.definition.parameters.iter().map(|one| one.name);
         let effect = Effect::of(guess.definition, names.zip(guess.values.iter().copied())).ok()?;
-        // Quantisation acts in the converter, which rounds to the declared step as well: a divisor of any other.
-        let is_converter = guess.definition.name == "quantisation";
         let base = self.oracle.base.spread_by(guess.spread).ok()?;
-        let rate_hz = base.rig.array.rate_hz();
-        let mut all = Vec::with_capacity(self.with.len());
-        for run in &self.oracle.planned {
-            let effects = vec![effect.clone()];
-            let simulator = Simulator { covering: run.covering, effects, ..base.sensor.clone() };
-            let mut pipeline = Pipeline::new(&simulator).ok()?;
-            pipeline.share(Arc::clone(&self.images));
-            for frame in 0..run.frames {
-                let t_s = frame as f64 / rate_hz;
-                let temperature_c = self.oracle.has_thermometer.then(|| self.oracle.climate.at(t_s));
-                pipeline.step(Moment { t_s, temperature_c }, &run.trajectory);
-                all.extend(pipeline.counts());
-                if is_converter && guess.values[0] > 0.0 {
-                    let from = all.len() - pipeline.counts().len();
-                    for count in &mut all[from..] {
-                        *count = pipeline.read(*count, 0.0);
-                    }
-                }
-            }
-        }
-        Some(all)
+        self.oracle.modelled(&base, &effect, &self.images).ok()
     }
 
     /// Values from which a fit starts: neutral amplitudes at several shapes.

@@ -5,16 +5,17 @@ use std::collections::BTreeMap;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tactus_hidden::{CATALOGUE, Climate, Definition, Dose, HiddenSensor, RandomRig, STRENGTH_MAX};
-use tactus_model::effect::REGISTRY;
-use tactus_model::{ModelError, Simulator, TrajectoryError};
+use tactus_hidden::{CATALOGUE, Climate, Definition, Dose, RandomRig};
+use tactus_model::effect::{EffectError, REGISTRY};
+use tactus_model::{ModelError, TrajectoryError};
 use tactus_schema::Rig;
 use tactus_schema::table::Row;
 
 use crate::label::{Label, PhysicsLabel};
 use crate::nearest::{ClassFits, Fitter};
 use crate::noise::{Noise, NoiseKind};
-use crate::plan::{Plan, PlannedRun};
+use crate::oracle::{SeparationOracle, Visit};
+use crate::plan::Plan;
 use crate::separation::Separation;
 use crate::set::DataSet;
 
@@ -82,12 +83,10 @@ pub enum RecipeError {
     /// The plan made no trajectory.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
+    /// The base model does not take an effect.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
 }
-
-const STRENGTH_MIN: f64 = 1e-5;
-const TRIALS_MAX: usize = 24;
-/// Relative tolerance of a requested separation.
-const CLOSE: f64 = 0.01;
 
 /// Uses of random numbers. Each has its own stream.
 #[derive(Debug, Clone, Copy)]
@@ -100,6 +99,26 @@ enum RandomStream {
     Thermometer,
     NoiseKind,
     Noise,
+    OtherPlan,
+    OtherNoise,
+}
+
+impl RandomStream {
+    /// That of the path of a measurement.
+    const fn plan(visit: Visit) -> Self {
+        match visit {
+            Visit::Own => Self::Plan,
+            Visit::Elsewhere | Visit::Later => Self::OtherPlan,
+        }
+    }
+
+    /// That of its noise.
+    const fn noise(visit: Visit) -> Self {
+        match visit {
+            Visit::Own => Self::Noise,
+            Visit::Elsewhere | Visit::Later => Self::OtherNoise,
+        }
+    }
 }
 
 impl Recipe {
@@ -123,10 +142,21 @@ impl Recipe {
     pub fn make(&self) -> Result<DataSet, RecipeError> {
         self.check()?;
         let chosen = self.content.choose(&mut self.rng(RandomStream::Content))?;
-        let base = RandomRig::new(self.seed_of(RandomStream::Base))?;
-        let oracle = self.oracle(&base)?;
-        let (doses, mut physics) = self.doses(&chosen, &oracle);
-        let Readings { rows, clean } = self.read(&oracle, &doses);
+        let base = self.base()?;
+        let oracle = self.oracle(&base, Visit::Own)?;
+        let (doses, physics) = self.doses(&chosen, &oracle);
+        Ok(self.measured(&oracle, &doses, physics))
+    }
+
+    /// The readings of a measurement, with their label.
+    pub(crate) fn measured(
+        &self,
+        oracle: &SeparationOracle<'_>,
+        doses: &[Dose],
+        mut physics: Vec<PhysicsLabel>,
+    ) -> DataSet {
+        let base = oracle.base;
+        let Readings { rows, clean } = self.read(oracle, doses);
         let Separation { z, z_beyond_spread, .. } = oracle.separation_of(&clean);
         // The separation of a single physics is that of the set.
         if let [only] = &mut physics[..] {
@@ -148,7 +178,7 @@ impl Recipe {
             sigma_intercept_mm: psf.sigma_intercept_mm,
             sigma_per_mm: psf.sigma_per_mm,
         };
-        Ok(DataSet { rig: base.rig, rows, label })
+        DataSet { rig: base.rig.clone(), rows, label }
     }
 
     /// The fits of all effects of the library to one physics of this set's label, alone and without noise.
@@ -174,19 +204,33 @@ impl Recipe {
         of: &PhysicsLabel,
         fit: impl Fn(&Fitter<'_>) -> ClassFits,
     ) -> Result<ClassFits, RecipeError> {
-        let physics = Definition::find(&of.id).ok_or_else(|| RecipeError::UnknownPhysics(of.id.clone()))?;
-        let base = RandomRig::new(self.seed_of(RandomStream::Base))?;
-        let oracle = self.oracle(&base)?;
-        let with = oracle.counts(&base, &[Dose { physics, strength: of.strength, seed: of.seed }]);
+        let base = self.base()?;
+        let oracle = self.oracle(&base, Visit::Own)?;
+        let with = oracle.counts(&base, &[of.dose()?]);
         Ok(fit(&Fitter::new(&oracle, &with)))
     }
 
-    fn oracle<'a>(&self, base: &'a RandomRig) -> Result<SeparationOracle<'a>, RecipeError> {
+    /// The set's sensor.
+    pub(crate) fn base(&self) -> Result<RandomRig, RecipeError> {
+        Ok(RandomRig::new(self.seed_of(RandomStream::Base))?)
+    }
+
+    pub(crate) fn oracle<'a>(
+        &self,
+        base: &'a RandomRig,
+        visit: Visit,
+    ) -> Result<SeparationOracle<'a>, RecipeError> {
         let Rig { array, registration, covering, .. } = &base.rig;
-        let planned =
-            self.plan.runs(array, *registration, *covering, self.frames, self.seed_of(RandomStream::Plan))?;
+        let planned = self.plan.runs(
+            array,
+            *registration,
+            *covering,
+            self.frames,
+            self.seed_of(RandomStream::plan(visit)),
+        )?;
         Ok(SeparationOracle::new(
             base,
+            visit,
             planned,
             Climate::new(self.seed_of(RandomStream::Climate)),
             self.rng(RandomStream::Thermometer).random_bool(0.7),
@@ -237,7 +281,7 @@ impl Recipe {
     /// The readings of all runs.
     fn read(&self, oracle: &SeparationOracle<'_>, doses: &[Dose]) -> Readings {
         let array = &oracle.base.rig.array;
-        let mut rng = self.rng(RandomStream::Noise);
+        let mut rng = self.rng(RandomStream::noise(oracle.visit));
         let mut noise_of = oracle.noise.series(&mut rng, array.elements());
         let mut noise_counts = vec![0.0; array.elements()];
         let mut readings = Readings::default();
@@ -247,7 +291,7 @@ impl Recipe {
                 if oracle.planned.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
             for (frame, (press, phase)) in planned.phases_of_frames(array.rate_hz()).enumerate() {
                 let t_s = frame as f64 / array.rate_hz();
-                sensor.step(t_s, &planned.trajectory);
+                oracle.step(&mut sensor, t_s, planned);
                 noise_of(&mut noise_counts);
                 let mut counts = Vec::with_capacity(array.elements());
                 for (clean, noise) in sensor.counts().iter().zip(&noise_counts) {
@@ -339,133 +383,6 @@ struct Readings {
     rows: Vec<Row>,
     /// The counts of all rows without noise and quantisation.
     clean: Vec<f64>,
-}
-
-/// Computes how far physics is from the base model on the runs of one set.
-pub(crate) struct SeparationOracle<'a> {
-    pub(crate) base: &'a RandomRig,
-    pub(crate) planned: Vec<PlannedRun>,
-    pub(crate) climate: Climate,
-    /// True if the table tells the temperature.
-    pub(crate) has_thermometer: bool,
-    noise: Noise,
-    /// Counts of all frames, without physics and noise.
-    pub(crate) clean: Vec<f64>,
-    /// The same with a spread that is [`WIDER`] times as wide.
-    wider: Vec<f64>,
-}
-
-/// The spread of [`SeparationOracle::wider`], as a multiple of the true one.
-const WIDER: f64 = 1.001;
-/// The search for the nearest spread ends when its change is below this share, or after this many rounds.
-const SPREAD_CHANGE_LEAST: f64 = 5e-4;
-const SPREAD_ROUNDS: usize = 3;
-
-impl<'a> SeparationOracle<'a> {
-    fn new(
-        base: &'a RandomRig,
-        planned: Vec<PlannedRun>,
-        climate: Climate,
-        has_thermometer: bool,
-        noise: Noise,
-    ) -> Self {
-        let (clean, wider) = (Vec::new(), Vec::new());
-        let mut oracle = Self { base, planned, climate, has_thermometer, noise, clean, wider };
-        oracle.clean = oracle.counts(base, &[]);
-        oracle.wider =
-            base.spread_by(WIDER).map_or_else(|_| oracle.clean.clone(), |wider| oracle.counts(&wider, &[]));
-        oracle
-    }
-
-    fn sensor(&self, base: &RandomRig, doses: &[Dose], run: usize) -> HiddenSensor {
-        let covering = self.planned[run].covering;
-        HiddenSensor::new(&Simulator { covering, ..base.sensor.clone() }, doses, self.climate, run as u64)
-    }
-
-    /// Counts of all frames without noise.
-    fn counts(&self, base: &RandomRig, doses: &[Dose]) -> Vec<f64> {
-        let rate_hz = base.rig.array.rate_hz();
-        let mut counts = Vec::new();
-        for (index, run) in self.planned.iter().enumerate() {
-            let mut sensor = self.sensor(base, doses, index);
-            for frame in 0..run.frames {
-                sensor.step(frame as f64 / rate_hz, &run.trajectory);
-                counts.extend(sensor.counts().iter().map(|count| sensor.convert(*count)));
-            }
-        }
-        counts
-    }
-
-    fn separation(&self, dose: Dose) -> Separation {
-        self.separation_of(&self.counts(self.base, &[dose]))
-    }
-
-    pub(crate) fn sigma_counts(&self) -> f64 {
-        self.noise.effective_rms_counts(self.base.rig.array.step_counts())
-    }
-
-    pub(crate) fn separation_of(&self, with: &[f64]) -> Separation {
-        let array = &self.base.rig.array;
-        let sigma_counts = self.sigma_counts();
-        let from = |clean: &[f64], wider: &[f64]| {
-            Separation::new(clean, with, wider, array.elements(), sigma_counts)
-        };
-        let mut separation = from(&self.clean, &self.wider);
-        // Counts are linear only in small changes of the spread: a large change is compared again at the new spread.
-        let mut spread = 1.0;
-        for _ in 0..SPREAD_ROUNDS {
-            let change = (WIDER - 1.0) * separation.spread_steps;
-            if change.abs() < SPREAD_CHANGE_LEAST {
-                break;
-            }
-            spread *= (1.0 + change).clamp(0.8, 1.25);
-            let (Ok(base), Ok(wider)) = (self.base.spread_by(spread), self.base.spread_by(WIDER * spread))
-            else {
-                break;
-            };
-            let nearer = from(&self.counts(&base, &[]), &self.counts(&wider, &[]));
-            let z_beyond_spread = nearer.z_beyond_spread.min(separation.z_beyond_spread);
-            separation = Separation { z_beyond_spread, spread_steps: nearer.spread_steps, ..separation };
-        }
-        separation
-    }
-
-    /// Finds the strength at which a physics has the separation `wanted`. Returns the dose, its separation, and whether
-    /// that is the one wanted. If no strength has it (an element is dead or not), the result is the nearest.
-    ///
-    /// Each step first guesses that separation is proportional to strength.
-    fn dose(&self, dose: Dose, wanted: f64, z_of: fn(&Separation) -> f64) -> (Dose, Separation, bool) {
-        let (mut low, mut high) = (STRENGTH_MIN, STRENGTH_MAX);
-        let mut strength: f64 = 1.0;
-        let mut nearest = (dose, Separation::default(), f64::INFINITY);
-        for _ in 0..TRIALS_MAX {
-            let tried = Dose { strength, ..dose };
-            let separation = self.separation(tried);
-            let z = z_of(&separation);
-            let off = (z / wanted).ln().abs();
-            if off < nearest.2 {
-                nearest = (tried, separation, off);
-            }
-            if off <= CLOSE || low >= 0.999 * high {
-                break;
-            }
-            if z < wanted {
-                low = strength;
-            } else {
-                high = strength;
-            }
-            let guess = strength * (wanted / z).clamp(0.05, 20.0);
-            strength = if guess > low * 1.001 && guess < high * 0.999 {
-                guess
-            } else if guess >= STRENGTH_MAX && high >= STRENGTH_MAX {
-                STRENGTH_MAX
-            } else {
-                (low * high).sqrt()
-            };
-        }
-        let (dose, separation, off) = nearest;
-        (dose, separation, off <= 2.0 * CLOSE)
-    }
 }
 
 /// A random physics among those that fulfil a condition.

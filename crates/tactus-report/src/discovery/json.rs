@@ -15,7 +15,7 @@ use tactus_model::effect::{Draft, Law};
 use tactus_schema::draft::stage_name;
 
 use super::draft::status;
-use super::words::{because, flags};
+use super::words::{because, closed_share, flags};
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, LabEffect, in_words};
 
 /// Name of the form of `report.json`.
@@ -210,6 +210,8 @@ struct CandidateJson<'a> {
 struct GivenUpJson<'a> {
     effect: &'a str,
     because: String,
+    /// Share of the gap that it closes on presses that its fit has not seen; null unless that is the reason.
+    closed_share: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -613,7 +615,7 @@ impl<'a> RoundJson<'a> {
 
 impl<'a> GivenUpJson<'a> {
     fn of(one: &'a GivenUp) -> Self {
-        Self { effect: one.effect, because: because(one) }
+        Self { effect: one.effect, because: because(one), closed_share: closed_share(one) }
     }
 }
 

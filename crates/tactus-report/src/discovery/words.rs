@@ -158,13 +158,24 @@ pub(super) fn depends_on(found: &Discovery) -> String {
     list(named)
 }
 
+/// The share of the gap that an effect closes on presses that its fit has not seen, if it was given up for that.
+pub(super) fn closed_share(one: &GivenUp) -> Option<f64> {
+    match one.because {
+        Because::Far(share) => Some(share),
+        Because::Rival(_)
+        | Because::NearestForm(_)
+        | Because::Little
+        | Because::Other(_)
+        | Because::Unconfirmed
+        | Because::Draft => None,
+    }
+}
+
 /// Why an effect was given up, as a clause.
 pub(super) fn because(one: &GivenUp) -> String {
     // The clause has the share, which would be told as 0 or less.
-    if let Because::Far(share) = one.because
-        && share < 0.005
-    {
-        return "it comes nearest, and closes nothing of the gap on held-out presses: an effect closes more of its own physics"
+    if closed_share(one).is_some_and(|share| share < 0.005) {
+        return "it comes nearest, and closes nothing of the gap on presses that its fit has not seen: an effect closes more of its own physics"
             .into();
     }
     one.in_words()

@@ -86,6 +86,7 @@ fn the_json_has_every_field_of_its_schema_where_it_belongs() {
         ("/rounds/1/taken", "\"gain-drift\""),
         ("/rounds/3/taken", "null"),
         ("/given_up/0/effect", "\"gain-drift\""),
+        ("/given_up/0/closed_share", "null"),
         ("/staircase/0/with", "\"base model\""),
         ("/staircase/3/heldout_rms_counts", "2.08"),
         ("/unexplained/gap", "[]"),
@@ -249,6 +250,7 @@ fn a_name_that_is_only_the_nearest_is_tentative_with_what_it_closes() {
     discovery.given_up.push(GivenUp { effect, because: Because::Far(0.62) });
     let text = in_words(&discovery);
     assert!(text.contains(&format!("Tentative: {effect}: it comes nearest, and closes 62 %")), "{text}");
+    assert_eq!(json(&discovery)["given_up"][1]["closed_share"], 0.62);
 }
 
 #[test]
@@ -661,7 +663,7 @@ fn a_share_that_is_closed_beside_others_is_not_told_as_if_it_were_closed_alone()
     for text in [
         "by itself or beside the others (with indenter-size and edge-effect it closes 96 % of the gap, 2 points more than they do).",
         "(with indenter-size it closes 94 % of the gap, 6 points more than indenter-size does).",
-        "closes nothing of the gap on held-out presses: an effect closes more of its own physics (alone it would close nothing of the gap).",
+        "closes nothing of the gap on presses that its fit has not seen: an effect closes more of its own physics (alone it would close nothing of the gap).",
         "Round 4: the base model alone</h3>\n<p>The search begins anew.</p>",
         "Round 7: the base model alone</h3>\n<p>The search begins anew, without indenter-size and edge-effect, which a rival took over.</p>",
     ] {
