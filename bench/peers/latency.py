@@ -40,6 +40,8 @@ def main():
     args = arguments()
     if args.part:
         return PARTS[args.part](*args.rest)
+    if args.growth:
+        return print(growth(args))
     result = {"machine": machine.described(machine.versions("pyserial", "pyzmq", "pylsl")), "rows": []}
     for rate_hz, seconds in ((30, args.seconds), (1000, args.seconds / 3)):
         for busy in (False, True):
@@ -66,11 +68,32 @@ def arguments():
     parser.add_argument("--seconds", type=float, default=30.0, help="of a round at 30 Hz; a third of it at 1 kHz")
     parser.add_argument("--who", nargs="+", default=["tactus", "queue", "zenoh", "zmq", "lsl"])
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--growth", action="store_true", help="of Tactus alone, with the rate and with the number of who hear it")
     parser.add_argument("--part", choices=PARTS, help=argparse.SUPPRESS)
     parser.add_argument("rest", nargs="*", help=argparse.SUPPRESS)
     args = parser.parse_args()
-    args.bench, args.daemon = args.bench.resolve(), args.daemon.resolve()
+    args.bench, args.daemon, args.others = args.bench.resolve(), args.daemon.resolve(), 0
     return args
+
+
+def growth(args):
+    """Latency, processor time and memory of the service at several rates and with several who hear it, and with which powers they grow."""
+    costs = {"p50_ms": "p50", "core_share": "processor", "memory_mib": "memory"}
+    lines = [machine.described({}), f"{'rate':>7} {'hear it':>8} {'p50 ms':>9} {'p99 ms':>9} {'p99.9 ms':>9} {'lost':>5} {'% core':>7} {'MiB':>6}"]
+    powers = []
+    for what, sizes in (("rate", [(30, 1), (120, 1), (480, 1)]), ("who hear it", [(30, 1), (30, 4), (30, 16)])):
+        rows = []
+        for rate_hz, hear in sizes:
+            args.others = hear - 1
+            count = int(rate_hz * args.seconds)
+            rounds = [one_round("tactus", args, rate_hz, count) for _ in range(args.rounds)]
+            row = {key: statistics.median(one[key] for one in rounds) for key in rounds[0]}
+            rows.append((rate_hz if what == "rate" else hear, row))
+            times = " ".join(f"{row[key]:>9.3f}" for key in ("p50_ms", "p99_ms", "p999_ms"))
+            lines.append(f"{rate_hz:>4} Hz {hear:>8} {times} {row['lost']:>5.0f} {100 * row['core_share']:>7.2f} {row['memory_mib']:>6.1f}")
+        of = [f"{name} ^{machine.exponent([(size, row[key]) for size, row in rows]):.2f}" for key, name in costs.items()]
+        powers.append(f"with {what}: {', '.join(of)}")
+    return "\n".join(lines + powers)
 
 
 def one_round(who, args, rate_hz, count):
@@ -193,6 +216,8 @@ def start_tactus(args, folder, device, writer, count, *how):
     passes = begin(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=(folder / "log").open("w"))
     # A rig is ready once its frames flow.
     writer.start()
+    for _ in range(args.others):
+        start([args.bench, "hear", endpoint, count], seconds=20)
     hears = start([args.bench, "hear", endpoint, count, *how], seconds=20)
     return passes, hears
 

@@ -2,6 +2,7 @@
 
 import datetime
 import importlib.metadata
+import math
 import os
 import platform
 
@@ -22,3 +23,11 @@ def versions(*packages):
 def described(versions):
     """Both in a line."""
     return f"{machine()}; " + ", ".join(f"{who} {version}" for who, version in versions.items())
+
+
+def exponent(points):
+    """`p`, where the second of each pair grows as `first^p`: the least-squares slope of the logarithms."""
+    logs = [(math.log(size), math.log(cost)) for size, cost in points]
+    mean_size, mean_cost = (sum(axis) / len(logs) for axis in zip(*logs))
+    along = sum((size - mean_size) * (cost - mean_cost) for size, cost in logs)
+    return along / sum((size - mean_size) ** 2 for size, _ in logs)

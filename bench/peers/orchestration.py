@@ -10,19 +10,23 @@ rig's twin; it records nothing.
 
 import argparse
 import json
+import resource
 import statistics
 import subprocess
 import tempfile
 import time
 from pathlib import Path
 
-from machine import described, versions
+from machine import described, exponent, versions
 
 REPOSITORY = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 
 # What is counted, the script, and how often the script does it; `None`: as often as the program says.
 WORKS = {"presses": ("grid-sweep", None), "points": (HERE / "points.star", 100 * 100), "readings": (HERE / "readings.star", 10_000)}
+
+# Sizes of the works that have one, for the growth: a quarter of them and all.
+SIZES = {"points": [("across=50", 50 * 50), ("across=100", 100 * 100)], "readings": [("readings=2500", 2_500), ("readings=10000", 10_000)]}
 
 
 def main():
@@ -46,8 +50,10 @@ def main():
     for ways in result.values():
         for who, rounds in ways.items():
             ways[who] = {key: statistics.median(one[key] for one in rounds) for key in rounds[0]}
+    growth = {work: growth_of(args.binary, work, args.rounds) for work in SIZES}
     if args.json:
-        print(json.dumps({"machine": described(versions("bluesky", "ophyd")), "works": result}, indent=1))
+        machine = described(versions("bluesky", "ophyd"))
+        print(json.dumps({"machine": machine, "works": result, "growth": growth}, indent=1))
         return
     print(described(versions("bluesky", "ophyd")))
     print(f"{'what':<10}{'who':<14}{'done':>9}{'s':>9}{'a second':>12}{'to bluesky':>12}")
@@ -55,14 +61,30 @@ def main():
         for who, one in ways.items():
             ratio = one["per_s"] / ways["bluesky"]["per_s"]
             print(f"{work:<10}{who:<14}{one['done']:>9.0f}{one['s']:>9.3f}{one['per_s']:>12,.0f}{ratio:>12.1f}")
+    for work, ways in growth.items():
+        for who, power in ways.items():
+            print(f"{who} of {work}: processor time ~ {work}^{power:.2f}")
 
 
-def tactus(binary, work, command, *options):
-    script, done = WORKS[work]
+def growth_of(binary, work, rounds):
+    """With which power of the number of steps the processor time grows, that of the script's process and of the programs' start included."""
+    powers = {}
+    for command, options in (("run", ["--embedded", "--no-report"]), ("plan", [])):
+        times = []
+        for parameter, done in SIZES[work]:
+            one = lambda: tactus(binary, work, command, *options, "--param", parameter, done=done)["processor_s"]
+            times.append((done, statistics.median(one() for _ in range(rounds))))
+        powers[f"tactus {command}"] = exponent(times)
+    return powers
+
+
+def tactus(binary, work, command, *options, done=None):
+    script, usual = WORKS[work]
+    done = done or usual
     with tempfile.TemporaryDirectory() as folder:
-        start = time.perf_counter()
+        start, before = time.perf_counter(), used()
         ended = subprocess.run([binary, command, script, *options, "--json"], cwd=folder, capture_output=True, text=True)
-        seconds = time.perf_counter() - start
+        seconds, processor_s = time.perf_counter() - start, used() - before
     if ended.returncode:
         raise SystemExit(ended.stderr)
     told = json.loads(ended.stdout)
@@ -70,7 +92,13 @@ def tactus(binary, work, command, *options):
     # A run of points has at least a frame for each.
     if told["exit_status"] != "done" or told.get("frames", done) < done:
         raise SystemExit(f"{script}: {ended.stdout}")
-    return {"done": done, "s": seconds, "per_s": done / seconds}
+    return {"done": done, "s": seconds, "per_s": done / seconds, "processor_s": processor_s}
+
+
+def used():
+    """Processor time of all programs that have ended."""
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return ended.ru_utime + ended.ru_stime
 
 
 def bluesky(across=20, readings=400):

@@ -20,6 +20,8 @@ import machine
 
 REPOSITORY = Path(__file__).parents[2]
 CHUNK_FRAMES, SYNC_FRAMES = 15, 30
+# The largest size beside the smallest, for the growth.
+GROWTH = 4
 
 
 def main():
@@ -27,16 +29,19 @@ def main():
     parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/dist/examples/throughput")
     parser.add_argument("--frames", type=int, default=30_000)
     parser.add_argument("--rounds", type=int, default=5, help="the median of so many")
+    parser.add_argument("--folder", type=Path, default=REPOSITORY / "target", help="on the disk that is measured")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
-    with tempfile.TemporaryDirectory(dir=REPOSITORY / "target") as folder:
-        command = [args.binary, str(args.frames), folder]
-        ways = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)["ways"]
+    with tempfile.TemporaryDirectory(dir=args.folder) as folder:
+        ways, larger = (throughput(args.binary, frames, folder) for frames in (args.frames, GROWTH * args.frames))
         for name, sync in (("h5py", False), ("h5py_synced", True)):
             rounds = [table(Path(folder) / "frames.h5", args.frames, sync) for _ in range(args.rounds)]
             ways[name] = {key: statistics.median(one[key] for one in rounds) for key in rounds[0]}
+    times = lambda name: [(size, size / of[name]["frames_per_s"]) for size, of in ((args.frames, ways), (GROWTH * args.frames, larger))]
+    growth = {name: machine.exponent(times(name)) for name in sorted(larger)}
     if args.json:
-        print(json.dumps({"machine": machine.described(machine.versions("h5py", "numpy")), "frames": args.frames, "ways": ways}, indent=1))
+        described = machine.described(machine.versions("h5py", "numpy"))
+        print(json.dumps({"machine": described, "frames": args.frames, "ways": ways, "growth": growth}, indent=1))
         return
     print(machine.described(machine.versions("h5py", "numpy")))
     print(f"{'who':<16}{'frames/s':>12}{'bytes/frame':>13}{'share of mcap':>15}")
@@ -44,6 +49,13 @@ def main():
         bare = ways["mcap_synced" if name.endswith("_synced") else "mcap"]
         share = way["frames_per_s"] / bare["frames_per_s"]
         print(f"{name:<16}{way['frames_per_s']:>12,.0f}{way['bytes_per_frame']:>13.0f}{share:>15.2f}")
+    for name, exponent in growth.items():
+        print(f"{name}: time ~ frames^{exponent:.2f}, from {args.frames:,} to {GROWTH * args.frames:,}")
+
+
+def throughput(binary, frames, folder):
+    command = [binary, str(frames), folder]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)["ways"]
 
 
 def table(path, frames, sync):

@@ -32,4 +32,4 @@ pub use limits::{Kernel, MachineLimits};
 pub use method::{Method, Painter};
 pub use models::{even, model};
 pub use press::{COVERING, DEPTH_MAX_MM, Pose, Tool, fine_sphere, poses};
-pub use rigs::{Devices, RigsMeasured, RigsTrial, serve_devices};
+pub use rigs::{CollectorMeasured, Devices, RigsMeasured, RigsTrial, serve_devices};

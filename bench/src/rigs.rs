@@ -4,7 +4,9 @@
 //! The devices are virtual ones of this process, each behind a socket of its own on loopback, so that the service under test is
 //! the real program with its real drivers. Each rig has its sensor and its stage.
 
+mod collector;
 mod devices;
+mod sent;
 
 use std::collections::HashMap;
 use std::fs;
@@ -16,6 +18,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use prost::Message as _;
+use rustix::process::{Pid, Signal, kill_process};
 use tactus_bus::{Client, Endpoint, Hold};
 use tactus_record::{Entry, Message};
 use tactus_runner::config::RigFiles;
@@ -29,7 +32,10 @@ use tokio::task::JoinSet;
 use tokio::time::{Instant as TokioInstant, sleep, timeout};
 use zenoh::Session;
 
+use collector::Collector;
+pub use collector::CollectorMeasured;
 pub use devices::Devices;
+use sent::SentTimes;
 
 /// Rate of every sensor.
 const RATE_HZ: f64 = 30.0;
@@ -53,6 +59,10 @@ pub struct RigsTrial {
     pub is_recording: bool,
     /// The devices of so many rigs die in the middle. What is counted is the others'.
     pub dying: usize,
+    /// Frames that the service keeps of each rig; its own choice without.
+    pub frames_kept: Option<usize>,
+    /// The program `tactus`, which collects all rigs beside the subscriber.
+    pub collector: Option<PathBuf>,
     /// Processors of the service, as `taskset` writes them; all of them without.
     pub cores: Option<String>,
 }
@@ -78,7 +88,14 @@ pub struct RigsMeasured {
     pub memory_kib: u64,
     /// Threads of the service.
     pub threads: u64,
+    /// From the call that sends a frame to the subscriber's callback, in ms: half of the frames, 99 % and 99.9 % take no longer.
+    pub latency_ms: [f64; 3],
+    /// What the collector took, if there was one.
+    pub collector: Option<CollectorMeasured>,
 }
+
+/// Quantiles of the latency.
+const QUANTILES: [f64; 3] = [0.5, 0.99, 0.999];
 
 /// The sequence numbers that came from one rig.
 #[derive(Debug, Clone, Copy)]
@@ -95,11 +112,21 @@ impl Seen {
     }
 }
 
+/// What the subscriber has heard.
+#[derive(Debug, Clone, Default)]
+struct Heard {
+    of_rigs: HashMap<String, Seen>,
+    /// How long each frame was under way.
+    took: Vec<Duration>,
+}
+
 /// What the subscriber reads of a [`pb::Frame`].
 #[derive(Clone, PartialEq, prost::Message)]
 struct Numbered {
     #[prost(uint64, tag = "1")]
     seq: u64,
+    #[prost(uint64, tag = "3")]
+    device_tick_ms: u64,
 }
 
 /// The service under test; it ends with this.
@@ -150,23 +177,31 @@ impl RigsTrial {
         if self.is_recording {
             start_runs(&service.endpoint, &names, &self.script()).await?;
         }
-        let (seen, is_counting) =
-            (Arc::<Mutex<HashMap<String, Seen>>>::default(), Arc::new(AtomicBool::new(false)));
+        let (heard, is_counting) = (Arc::<Mutex<Heard>>::default(), Arc::new(AtomicBool::new(false)));
         let session = session(&service.endpoint).await?;
         let _subscriber = session
             .declare_subscriber("tactus/*/sensor/frame$*")
             .callback({
-                let (seen, is_counting) = (Arc::clone(&seen), Arc::clone(&is_counting));
+                let (heard, is_counting) = (Arc::clone(&heard), Arc::clone(&is_counting));
+                let sent = Arc::clone(&devices.sent);
                 move |sample| {
                     if is_counting.load(Ordering::Relaxed) {
-                        count(&seen, sample.key_expr().as_str(), &sample.payload().to_bytes());
+                        count(&heard, &sent, sample.key_expr().as_str(), &sample.payload().to_bytes());
                     }
                 }
             })
             .await
             .map_err(|error| anyhow::anyhow!("{error}"))?;
+        let mut collector = match &self.collector {
+            Some(program) => Some(Collector::start(program, &service.endpoint, service.folder.path())?),
+            None => None,
+        };
+        if let Some(collector) = &mut collector {
+            collector.has_all(self.rigs).await?;
+        }
         // Histories and caches fill up first.
         sleep(self.time / 2).await;
+        let collected_before = collector.as_ref().map(Collector::before).transpose()?;
         let pid = service.child.id();
         let (began, before) = (Instant::now(), processor_s(pid)?);
         is_counting.store(true, Ordering::Relaxed);
@@ -176,8 +211,13 @@ impl RigsTrial {
         is_counting.store(false, Ordering::Relaxed);
         let (seconds, spent_s) = (began.elapsed().as_secs_f64(), processor_s(pid)? - before);
         let (memory_kib, threads) = (status(pid, "RssAnon:")?, status(pid, "Threads:")?);
+        let counted = heard.lock().unwrap_or_else(PoisonError::into_inner).of_rigs.clone();
+        let frames: u64 = counted.values().map(|of| of.count).sum();
+        let collector = collector.zip(collected_before);
+        let collector = collector.map(|(collector, before)| collector.measured(&before, frames, self.rigs));
+        let collector = collector.transpose()?;
         service.end()?;
-        let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let Heard { of_rigs: mut seen, took } = heard.lock().unwrap_or_else(PoisonError::into_inner).clone();
         ensure!(seen.len() == self.rigs, "frames of {} of {} rigs came", seen.len(), self.rigs);
         seen.retain(|rig, _| !names.iter().take(self.dying).any(|dying| dying == rig));
         let frames: u64 = seen.values().map(|of| of.count).sum();
@@ -192,6 +232,8 @@ impl RigsTrial {
             cores: spent_s / seconds,
             memory_kib,
             threads,
+            latency_ms: quantiles_ms(took),
+            collector,
         })
     }
 
@@ -204,8 +246,9 @@ impl RigsTrial {
     fn start(&self, folder: tempfile::TempDir) -> Result<Service> {
         let port = std::net::TcpListener::bind("127.0.0.1:0")?.local_addr()?.port();
         let endpoint = format!("tcp/127.0.0.1:{port}");
+        let kept = self.frames_kept.map(|frames| format!("frames_kept = {frames}\n")).unwrap_or_default();
         let config = format!(
-            "rigs = \"rigs\"\nrecordings = \"runs\"\n[bus]\nlisten = [\"{endpoint}\"]\n[log]\nfilter = \"error\"\n"
+            "rigs = \"rigs\"\nrecordings = \"runs\"\n[bus]\nlisten = [\"{endpoint}\"]\n{kept}[log]\nfilter = \"error\"\n"
         );
         let path = folder.path().join("tactusd.toml");
         fs::write(&path, config)?;
@@ -242,8 +285,7 @@ impl RigsMeasured {
 impl Service {
     /// Asks it to end, and waits for that.
     fn end(&mut self) -> Result<()> {
-        let pid = i32::try_from(self.child.id()).ok().and_then(rustix::process::Pid::from_raw);
-        rustix::process::kill_process(pid.context("a process id")?, rustix::process::Signal::TERM)?;
+        end(&self.child, Signal::TERM)?;
         self.child.wait()?;
         Ok(())
     }
@@ -256,6 +298,12 @@ impl Drop for Service {
             drop(self.child.wait());
         }
     }
+}
+
+/// Asks a process to end.
+fn end(child: &Child, by: Signal) -> Result<()> {
+    let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+    Ok(kill_process(pid.context("a process id")?, by)?)
 }
 
 /// The rig file with its first embedded device at an address.
@@ -344,17 +392,35 @@ async fn start_run(endpoint: &Endpoint, rig: &str, script: &str) -> Result<()> {
 }
 
 /// Counts a frame that reached the subscriber.
-fn count(seen: &Mutex<HashMap<String, Seen>>, key: &str, payload: &[u8]) {
-    let (Some(rig), Ok(Numbered { seq })) = (key.split('/').nth(1), Numbered::decode(payload)) else {
+fn count(heard: &Mutex<Heard>, sent: &SentTimes, key: &str, payload: &[u8]) {
+    let (Some(rig), Ok(Numbered { seq, device_tick_ms })) =
+        (key.split('/').nth(1), Numbered::decode(payload))
+    else {
         return;
     };
-    let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(of) = seen.get_mut(rig) {
+    let sensor = rig.get(1..).and_then(|number| number.parse().ok());
+    let took = sensor.and_then(|sensor| sent.since(sensor, device_tick_ms));
+    let mut heard = heard.lock().unwrap_or_else(PoisonError::into_inner);
+    heard.took.extend(took);
+    if let Some(of) = heard.of_rigs.get_mut(rig) {
         of.last = seq;
         of.count += 1;
     } else {
-        seen.insert(rig.to_owned(), Seen { first: seq, last: seq, count: 1 });
+        heard.of_rigs.insert(rig.to_owned(), Seen { first: seq, last: seq, count: 1 });
     }
+}
+
+fn quantiles_ms(mut took: Vec<Duration>) -> [f64; 3] {
+    took.sort();
+    QUANTILES.map(|share| {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a place among those that are there"
+        )]
+        let place = (share * took.len() as f64) as usize;
+        took.get(place).or(took.last()).map_or(f64::NAN, |took| took.as_secs_f64() * 1e3)
+    })
 }
 
 /// Frames that the subscriber could have seen and that are in no recording.

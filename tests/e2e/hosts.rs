@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{Link, Process, binary, free_endpoint, repository, tactus, until, within};
+use tactus_e2e::{Link, Process, SmallDisk, binary, free_endpoint, repository, tactus, until, within};
 use tactus_record::{Entry, Message, Timeline};
 use tactus_schema::pb::run_event::Event;
 use tempfile::TempDir;
@@ -341,24 +341,6 @@ fn two_rigs_of_one_name_are_named_and_neither_is_recorded() {
     assert!(totals["problem"].as_str().unwrap().contains("name of its own"), "{totals}");
 }
 
-/// A small disk, in memory, which needs root.
-struct SmallDisk(PathBuf);
-
-impl SmallDisk {
-    fn mount(path: PathBuf) -> Option<Self> {
-        fs::create_dir(&path).unwrap();
-        let mounted =
-            Command::new("mount").args(["-t", "tmpfs", "-o", "size=72m", "tmpfs"]).arg(&path).status();
-        mounted.is_ok_and(|status| status.success()).then_some(Self(path))
-    }
-}
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        drop(Command::new("umount").arg(&self.0).status());
-    }
-}
-
 #[test]
 fn a_full_disk_ends_the_collector_and_its_file_says_so() {
     let folder = TempDir::new().unwrap();
@@ -371,12 +353,11 @@ fn a_full_disk_ends_the_collector_and_its_file_says_so() {
     let mut collector = collect(folder.path(), &host.endpoint, &[]);
     collector.wait_for("left: found");
     wait_until_collected(folder.path(), "left", host.wait_for_frames(5));
-    let fill = disk.0.join("fill");
-    fs::write(&fill, vec![0; 80 << 20]).unwrap_err();
+    let fill = disk.fill();
     let (code, said) = collector.wait();
     assert!(code == Some(1) && said.contains("No space left"), "{code:?}: {said}");
     fs::remove_file(fill).unwrap();
-    let file = recordings(&disk.0.join("left")).remove(0).display().to_string();
+    let file = recordings(&disk.path().join("left")).remove(0).display().to_string();
     let info = tactus(folder.path(), &["record", "info", "--json", &file]).json();
     assert_eq!(
         (&info["exit_status"], &info["completeness"]["state"]),

@@ -6,7 +6,9 @@ use std::path::Path;
 
 use serde_json::Value;
 use tactus_bus::{Client, Endpoint, History, Subscription};
-use tactus_e2e::{CommandOutput, Process, free_endpoint, repository, small_rig, tactus, until, within};
+use tactus_e2e::{
+    CommandOutput, Process, SmallDisk, free_endpoint, repository, small_rig, tactus, until, within,
+};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb;
 use tempfile::TempDir;
@@ -15,6 +17,9 @@ use tokio::runtime::Runtime;
 /// Frames that the tests see before and after a rig dies.
 const FRAMES: usize = 15;
 const READS: &str = "def run(rig):\n    tare()\n    wait(8.0)\n";
+
+/// Longer than the tests need.
+const READS_ON: &str = "def run(rig):\n    tare()\n    wait(120.0)\n";
 
 /// A service of several rigs, in a folder.
 struct Lab {
@@ -176,6 +181,59 @@ fn devices_that_die_harm_no_other_rig_and_are_found_again() {
     // A stop without a name is for all of them.
     let stopped = lab.tactus(&["stop", "--json"]);
     assert_eq!((stopped.code, stopped.out.lines().count()), (Some(0), 3), "{stopped:?}");
+    daemon.signal(rustix::process::Signal::TERM);
+    let (code, said) = daemon.wait();
+    assert_eq!(code, Some(0), "{said}");
+}
+
+#[test]
+fn a_full_disk_of_one_rig_fails_its_run_and_no_frame_of_the_other_is_lost() {
+    let lab = Lab::new();
+    let runs = lab.folder.path().join("runs");
+    let Some(disk) = SmallDisk::mount(runs.join("left")) else {
+        return eprintln!("not tested: this user may not mount a disk");
+    };
+    let _mocks = ["left", "right"].map(|name| {
+        lab.add(name);
+        lab.mock(name)
+    });
+    let mut daemon = lab.serve();
+    for _ in 0..2 {
+        daemon.wait_for("ready: frames flow");
+    }
+    fs::write(lab.folder.path().join("reads.star"), READS_ON).unwrap();
+    let [left_run, _right_run] = ["left", "right"].map(|rig| {
+        let reset = lab.tactus(&["reset", "--rig", rig]);
+        assert_eq!(reset.code, Some(0), "{reset:?}");
+        let args = ["--endpoint", &lab.endpoint, "run", "reads.star", "--rig", rig, "--no-report"];
+        let run = Process::start("tactus", lab.folder.path(), &args);
+        daemon.wait_for("run accepted");
+        run
+    });
+    let runtime = Runtime::new().unwrap();
+    let right = lab.client(&runtime, "right");
+    let mut frames_of = within(&runtime, right.subscribe::<pb::Frame>(History::None)).unwrap();
+    let mut seen = within(&runtime, frames(&mut frames_of, FRAMES));
+
+    let fill = disk.fill();
+    let (code, said) = left_run.wait();
+    assert!(code == Some(1) && said.contains("No space left"), "{code:?}: {said}");
+    assert_eq!(lab.status("right")["problem"], Value::Null);
+    seen.extend(within(&runtime, frames(&mut frames_of, FRAMES)));
+    assert_unbroken(&seen);
+    let stopped = lab.tactus(&["stop", "--rig", "right"]);
+    assert_eq!(stopped.code, Some(0), "{stopped:?}");
+    until("the run is over", || (lab.status("right")["run"]["phase"] == "finished").then_some(()));
+    let right = recorded(&runs.join("right"));
+    assert_unbroken(&right);
+    assert!(seen.iter().all(|seq| right.contains(seq)), "{seen:?} are not all in {right:?}");
+
+    // What the left one has is whole up to the failure, and with room it records again.
+    assert_unbroken(&recorded(&runs.join("left")));
+    fs::remove_file(fill).unwrap();
+    fs::write(lab.folder.path().join("reads.star"), "def run(rig):\n    tare()\n").unwrap();
+    let again = lab.tactus(&["run", "reads.star", "--rig", "left", "--no-report"]);
+    assert_eq!(again.code, Some(0), "{again:?}");
     daemon.signal(rustix::process::Signal::TERM);
     let (code, said) = daemon.wait();
     assert_eq!(code, Some(0), "{said}");

@@ -6,6 +6,7 @@
 
 #[cfg(feature = "bus")]
 mod bus;
+mod disk;
 mod link;
 mod tap;
 mod terminal;
@@ -30,6 +31,7 @@ use tempfile::TempDir;
 
 #[cfg(feature = "bus")]
 pub use bus::{raw_session, within};
+pub use disk::SmallDisk;
 pub use link::Link;
 pub use tap::{Tap, Way};
 pub use terminal::Terminal;

@@ -20,10 +20,8 @@ use tactus_wire::weiss::{
 };
 use tokio::time::Instant;
 
-use super::RATE_HZ;
+use super::sent::{SLOTS, SentTimes, slot};
 
-/// Sensors are spread over so many times of sampling in each period, as those of independent rigs would be.
-const SLOTS: u32 = 32;
 /// Events that one call of the system returns at most.
 const EVENTS_MAX: usize = 256;
 const ROWS: u8 = 6;
@@ -37,6 +35,7 @@ const BASELINE_COUNTS: u16 = 100;
 pub struct Devices {
     /// Addresses of each rig's sensor and stage.
     pub(super) addresses: Vec<[String; 2]>,
+    pub(super) sent: Arc<SentTimes>,
     /// So many of the first rigs have no devices any more.
     dead: Arc<AtomicUsize>,
     ends: Arc<AtomicBool>,
@@ -49,6 +48,7 @@ struct Server {
     ports: Vec<Port>,
     /// When each port's device has something to do.
     wakes: Vec<Option<Instant>>,
+    sent: Arc<SentTimes>,
     dead: Arc<AtomicUsize>,
     ends: Arc<AtomicBool>,
 }
@@ -76,10 +76,12 @@ impl Devices {
     /// Serves a sensor and the stage of each rig at ports of their own on loopback.
     pub(super) fn start(stages: Vec<VirtualStage>) -> Result<Self> {
         let (dead, ends) = (Arc::<AtomicUsize>::default(), Arc::<AtomicBool>::default());
+        let sent = Arc::new(SentTimes::new(stages.len()));
         let mut server = Server {
             epoll: epoll::create(CreateFlags::CLOEXEC)?,
             ports: Vec::new(),
             wakes: Vec::new(),
+            sent: Arc::clone(&sent),
             dead: Arc::clone(&dead),
             ends: Arc::clone(&ends),
         };
@@ -89,7 +91,7 @@ impl Devices {
             addresses.push([sensor, server.listen(Device::Stage(Box::new(stage)))?]);
         }
         let thread = thread::Builder::new().name("devices".into()).spawn(move || server.serve())?;
-        Ok(Self { addresses, dead, ends, thread: Some(thread) })
+        Ok(Self { addresses, sent, dead, ends, thread: Some(thread) })
     }
 
     /// Addresses of the sensors.
@@ -125,7 +127,7 @@ impl Server {
     }
 
     fn serve(mut self) {
-        let slot = Duration::from_secs_f64(1.0 / (RATE_HZ * f64::from(SLOTS)));
+        let slot = slot();
         let began = Instant::now();
         for number in 0_u32.. {
             if self.ends.load(Ordering::Relaxed) {
@@ -194,9 +196,11 @@ impl Server {
         let ms = u32::try_from(at.as_millis()).unwrap_or(u32::MAX);
         let frame = encode_frame(ms, &counts, false);
         // Every second port is a sensor's.
-        let first = 2 * (number % SLOTS) as usize;
-        for port in self.ports.iter_mut().skip(first).step_by(2 * SLOTS as usize) {
+        let first = (number % SLOTS) as usize;
+        let sensors = self.ports.iter_mut().step_by(2).enumerate();
+        for (sensor, port) in sensors.skip(first).step_by(SLOTS as usize) {
             if let Device::Sensor(Sensor { acquires: true, .. }) = port.device {
+                self.sent.note(sensor, number);
                 port.say(&frame);
             }
         }

@@ -46,8 +46,8 @@ async fn main() -> Result<(), Box<dyn Error>> {
     loop {
         tokio::select! {
             biased;
-            Some(call) = calls.stops.recv() => pulse.answer(call),
-            Some(call) = calls.commands.recv() => pulse.answer(call),
+            Some(call) = calls.stops.recv() => pulse.answer(*call),
+            Some(call) = calls.commands.recv() => pulse.answer(*call),
             () = &mut interrupted => break,
             _ = beat.tick() => {
                 if seq % lose_every == lose_every - 1 {

@@ -6,13 +6,13 @@
 
 use std::{
     collections::VecDeque,
-    ops::RangeInclusive,
+    ops::{Range, RangeInclusive},
     sync::{Arc, Mutex, PoisonError},
 };
 
 use zenoh::{
     Session, Wait,
-    bytes::{Encoding, ZBytes},
+    bytes::Encoding,
     query::{Query, Queryable},
     sample::SourceInfo,
     session::EntityGlobalId,
@@ -52,13 +52,14 @@ pub(crate) struct HistoryQuery {
     source: Source,
 }
 
-/// The last messages with their publisher's numbers: 0, 1, 2, ...
+/// The last messages with their publisher's numbers: 0, 1, 2, ... Their bytes stand one behind the other: a buffer for each would cost as much again in
+/// the allocator, and a service keeps some 100,000.
 #[derive(Debug)]
 struct KeptMessages {
     capacity: usize,
     next: u32,
-    bytes: usize,
-    messages: VecDeque<(u32, ZBytes)>,
+    bytes: VecDeque<u8>,
+    lengths: VecDeque<u32>,
 }
 
 impl Cache {
@@ -91,42 +92,89 @@ impl Cache {
 
     /// Keeps a message that is about to be published. It must be kept before it is published: otherwise a client that joins
     /// in between would get it neither from here nor live.
-    pub(crate) fn keep(&self, payload: ZBytes) {
+    pub(crate) fn keep(&self, payload: &[u8]) {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner).push(payload);
     }
 }
 
 impl KeptMessages {
     fn new(capacity: usize) -> Self {
-        Self { capacity, next: 0, bytes: 0, messages: VecDeque::new() }
+        Self { capacity, next: 0, bytes: VecDeque::new(), lengths: VecDeque::new() }
     }
 
-    fn push(&mut self, payload: ZBytes) {
-        self.bytes = self.bytes.saturating_add(payload.len());
-        while (self.messages.len() == self.capacity || self.bytes > KEPT_BYTES_MAX)
-            && let Some((_, oldest)) = self.messages.pop_front()
+    fn push(&mut self, payload: &[u8]) {
+        let is_full = |kept: &Self| {
+            kept.lengths.len() == kept.capacity || kept.bytes.len() + payload.len() > KEPT_BYTES_MAX
+        };
+        while is_full(self)
+            && let Some(oldest) = self.lengths.pop_front()
         {
-            self.bytes = self.bytes.saturating_sub(oldest.len());
+            self.bytes.drain(..oldest as usize);
         }
-        self.messages.push_back((self.next, payload));
+        make_room(&mut self.bytes, payload.len());
+        make_room(&mut self.lengths, 1);
+        self.bytes.extend(payload);
+        // No message has 4 GiB.
+        self.lengths.push_back(u32::try_from(payload.len()).unwrap_or(u32::MAX));
         self.next = self.next.wrapping_add(1);
+    }
+
+    /// The messages' numbers, and where each stands.
+    fn places(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
+        let mut end = 0;
+        self.lengths.iter().zip(self.oldest()..).map(move |(length, number)| {
+            let start = end;
+            end += *length as usize;
+            (wrapped(number), start..end)
+        })
+    }
+
+    /// Number of the oldest message, as if numbers did not begin anew after the greatest.
+    fn oldest(&self) -> u64 {
+        u64::from(self.next) + (1 << 32) - self.lengths.len() as u64
     }
 
     /// The first of the messages numbered within the range, of at most the last `limit`, and how many they are.
     fn first(&self, numbers: &RangeInclusive<u32>, limit: usize) -> Option<(u32, usize)> {
-        let wanted = || self.messages.iter().map(|(number, _)| *number).filter(|of| numbers.contains(of));
+        let wanted = || self.places().map(|(number, _)| number).filter(|number| numbers.contains(number));
         let count = wanted().count();
         Some((wanted().nth(count.saturating_sub(limit))?, count.min(limit)))
     }
 
     /// From the message of this number on, or the oldest that is left: the next ones within the range, at most `count`.
-    fn from(&self, number: u32, numbers: &RangeInclusive<u32>, count: usize) -> Vec<(u32, ZBytes)> {
-        let oldest = self.messages.front().map_or(number, |(oldest, _)| *oldest);
-        let at = usize::try_from(number.wrapping_sub(oldest)).unwrap_or(usize::MAX);
-        let skipped = if at <= self.messages.len() { at } else { 0 };
-        let next = self.messages.iter().skip(skipped).filter(|(number, _)| numbers.contains(number));
-        next.take(count).cloned().collect()
+    fn from(&self, number: u32, numbers: &RangeInclusive<u32>, count: usize) -> Vec<(u32, Vec<u8>)> {
+        let at = number.wrapping_sub(wrapped(self.oldest())) as usize;
+        let skipped = if at <= self.lengths.len() { at } else { 0 };
+        let next = self.places().skip(skipped).filter(|(number, _)| numbers.contains(number));
+        next.take(count).map(|(number, place)| (number, self.copied(place))).collect()
     }
+
+    fn copied(&self, place: Range<usize>) -> Vec<u8> {
+        let (front, back) = self.bytes.as_slices();
+        let split = front.len();
+        let of = |bytes: &[u8], range: Range<usize>| bytes.get(range).unwrap_or_default().to_vec();
+        if place.end <= split {
+            of(front, place)
+        } else if place.start >= split {
+            of(back, place.start - split..place.end - split)
+        } else {
+            [of(front, place.start..split), of(back, 0..place.end - split)].concat()
+        }
+    }
+}
+
+/// Makes room for more items, and an eighth beyond: to double, as a queue does by itself, would leave half of it empty.
+fn make_room<T>(queue: &mut VecDeque<T>, more: usize) {
+    if queue.capacity() - queue.len() < more {
+        queue.reserve_exact(more.max(queue.len() / 8));
+    }
+}
+
+/// The number of a message.
+fn wrapped(number: u64) -> u32 {
+    #[expect(clippy::cast_possible_truncation, reason = "numbers begin anew after the greatest")]
+    let low = number as u32;
+    low
 }
 
 /// The queue of queries from the caches to the thread that replies, one at a time: zenoh closes a full link only when the

@@ -40,9 +40,9 @@ const EXIT_FAILED: u32 = 1;
 #[derive(Debug)]
 pub struct Calls {
     /// Stops: of `cmd/stop`, of [`STOP_EVERY_RIG`], and datagrams.
-    pub stops: mpsc::Receiver<CommandCall>,
+    pub stops: mpsc::Receiver<Box<CommandCall>>,
     /// All other calls, in order of arrival.
-    pub commands: mpsc::Receiver<CommandCall>,
+    pub commands: mpsc::Receiver<Box<CommandCall>>,
 }
 
 /// A received command, which must be answered.
@@ -183,14 +183,14 @@ pub(crate) fn drop_on_blocking_thread(query: Query, runtime: &Handle) {
 /// Where a rig's calls go.
 #[derive(Debug, Clone)]
 pub(crate) struct Intake {
-    stops: mpsc::Sender<CommandCall>,
-    commands: mpsc::Sender<CommandCall>,
+    stops: mpsc::Sender<Box<CommandCall>>,
+    commands: mpsc::Sender<Box<CommandCall>>,
 }
 
 impl Intake {
     /// A rig's own channel of commands, beside the channel of all rigs' stops.
-    pub(crate) fn open(stops: mpsc::Sender<CommandCall>) -> (Self, mpsc::Receiver<CommandCall>) {
-        // Bounded; a call that does not fit is refused at once.
+    pub(crate) fn open(stops: mpsc::Sender<Box<CommandCall>>) -> (Self, mpsc::Receiver<Box<CommandCall>>) {
+        // Bounded; a call that does not fit is refused at once. Boxed: the channel takes memory for 32 calls from the start, of each rig.
         let (commands, calls) = mpsc::channel(WAITING_COMMANDS);
         (Self { stops, commands }, calls)
     }
@@ -221,7 +221,7 @@ pub(crate) async fn declare(
 /// Declares the stop of every rig.
 pub(crate) async fn declare_stop(
     session: &Session,
-    stops: &mpsc::Sender<CommandCall>,
+    stops: &mpsc::Sender<Box<CommandCall>>,
     replies: &Replies,
 ) -> Result<Queryable<()>, BusError> {
     let key: Arc<str> = STOP_EVERY_RIG.into();
@@ -247,7 +247,7 @@ fn take_in(
     command: Command,
     query: Query,
     key: &Arc<str>,
-    calls: &mpsc::Sender<CommandCall>,
+    calls: &mpsc::Sender<Box<CommandCall>>,
     replies: &Replies,
 ) {
     if let Err(refusal) = pass_on(rig, command, query, key, calls, replies) {
@@ -266,7 +266,7 @@ fn pass_on(
     command: Command,
     mut query: Query,
     key: &Arc<str>,
-    calls: &mpsc::Sender<CommandCall>,
+    calls: &mpsc::Sender<Box<CommandCall>>,
     replies: &Replies,
 ) -> Result<(), Box<(Query, pb::CommandReply)>> {
     // Taken out: a waiting reply then holds no request.
@@ -276,7 +276,7 @@ fn pass_on(
         Err(error) => return Err(Box::new((query, refusal(EXIT_USAGE, error)))),
     };
     let to = ReplyTo::Bus { query, key: key.clone(), replies: replies.clone() };
-    let call = CommandCall { rig: rig.cloned(), command, request, reply: Responder { to } };
+    let call = Box::new(CommandCall { rig: rig.cloned(), command, request, reply: Responder { to } });
     calls.try_send(call).or_else(|refused| {
         let (call, error) = match refused {
             TrySendError::Full(call) => {

@@ -29,7 +29,7 @@ pub struct BusConfig {
     /// Names of rigs whose services may connect to this one and publish through it. Nobody else can publish, answer or
     /// announce anything here.
     pub guests: Vec<String>,
-    /// Frames that are kept of each rig for clients that join late or were cut off: 1 to 16,000, each some 400 bytes of memory with 48
+    /// Frames that are kept of each rig for clients that join late or were cut off: 1 to 16,000, each some 250 bytes of memory with 48
     /// elements. Default: 1,800, a minute at 30 Hz; 76,800 of all rigs together, if there are more than 42 of them.
     pub frames_kept: Option<usize>,
     /// Certificates for endpoints beyond this machine.

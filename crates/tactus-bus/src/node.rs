@@ -39,7 +39,7 @@ pub struct Node {
     pub(crate) carriers: [Carrier; 2],
     pub(crate) replies: Replies,
     pub(crate) history_queries: Arc<Queue<HistoryQuery>>,
-    pub(crate) stops: mpsc::Sender<CommandCall>,
+    pub(crate) stops: mpsc::Sender<Box<CommandCall>>,
     pub(crate) served: Served,
     /// Frames that are kept of each rig.
     pub(crate) frames_kept: usize,
@@ -67,7 +67,7 @@ impl Node {
     pub async fn open(
         config: &BusConfig,
         rigs: &[Keys],
-    ) -> Result<(Arc<Self>, mpsc::Receiver<CommandCall>), BusError> {
+    ) -> Result<(Arc<Self>, mpsc::Receiver<Box<CommandCall>>), BusError> {
         config.check()?;
         let session = zenoh::open(config.service(rigs)?)
             .await
@@ -110,7 +110,10 @@ impl Node {
     ///
     /// # Errors
     /// [`BusError::Key`] if the rig's name is not valid in a key, [`BusError::Served`] if the node serves a rig of that name.
-    pub async fn serve(self: &Arc<Self>, keys: Keys) -> Result<(Bus, mpsc::Receiver<CommandCall>), BusError> {
+    pub async fn serve(
+        self: &Arc<Self>,
+        keys: Keys,
+    ) -> Result<(Bus, mpsc::Receiver<Box<CommandCall>>), BusError> {
         Bus::declare(Arc::clone(self), keys).await
     }
 
@@ -122,7 +125,7 @@ impl Node {
     pub async fn check_denials(
         &self,
         bus: &Bus,
-        commands: &mut mpsc::Receiver<CommandCall>,
+        commands: &mut mpsc::Receiver<Box<CommandCall>>,
     ) -> Result<(), BusError> {
         if self.config.tls.is_none() {
             return Ok(());
@@ -191,7 +194,7 @@ fn start<T: Send + 'static>(
 fn stop_sockets(
     config: &BusConfig,
     served: &Served,
-    stops: &mpsc::Sender<CommandCall>,
+    stops: &mpsc::Sender<Box<CommandCall>>,
 ) -> Result<Vec<StopSocket>, BusError> {
     let open = |endpoint: &Endpoint| {
         StopSocket::open(endpoint, served.clone(), stops.clone())

@@ -8,7 +8,6 @@ use tactus_schema::{
 };
 use zenoh::{
     Session, Wait,
-    bytes::ZBytes,
     qos::{CongestionControl, Reliability},
 };
 use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, MissDetectionConfig};
@@ -150,8 +149,7 @@ impl TopicPublisher {
     }
 
     fn publish(&self, payload: Vec<u8>) {
-        let payload = ZBytes::from(payload);
-        self.cache.keep(payload.clone());
+        self.cache.keep(&payload);
         if let Err(error) = self.publisher.put(payload).wait() {
             tracing::warn!(key = %self.publisher.key_expr(), %error, "not published");
         }

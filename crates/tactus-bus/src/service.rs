@@ -49,7 +49,7 @@ impl Bus {
     pub(crate) async fn declare(
         node: Arc<Node>,
         keys: Keys,
-    ) -> Result<(Self, mpsc::Receiver<CommandCall>), BusError> {
+    ) -> Result<(Self, mpsc::Receiver<Box<CommandCall>>), BusError> {
         if !node.served.add(keys.rig()) {
             return Err(BusError::Served { rig: keys.rig().to_owned() });
         }
@@ -64,7 +64,7 @@ impl Bus {
     async fn declare_keys(
         node: Arc<Node>,
         keys: Keys,
-    ) -> Result<(Self, mpsc::Receiver<CommandCall>), BusError> {
+    ) -> Result<(Self, mpsc::Receiver<Box<CommandCall>>), BusError> {
         let session = &node.session;
         let (intake, commands) = Intake::open(node.stops.clone());
         let instance = InstanceToken::declare(session, &keys).await?;

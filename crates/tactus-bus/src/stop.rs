@@ -81,7 +81,7 @@ impl StopSocket {
     pub(crate) fn open(
         endpoint: &Endpoint,
         served: Served,
-        stops: mpsc::Sender<CommandCall>,
+        stops: mpsc::Sender<Box<CommandCall>>,
     ) -> io::Result<Option<Self>> {
         let (socket, path) = if let Some(path) = place(endpoint) {
             (Socket::Unix(bind_unix(&path)?), Some(path))
@@ -99,7 +99,7 @@ impl StopSocket {
                 while !closed.load(Ordering::Acquire) {
                     if let Some((rig, request, from)) = receive(&socket, &served) {
                         let reply = Responder::to_datagram(StopSender { socket: socket.clone(), from });
-                        let call = CommandCall { rig, command: Command::Stop, request, reply };
+                        let call = Box::new(CommandCall { rig, command: Command::Stop, request, reply });
                         // Full: so many stops wait already that this one would change nothing.
                         if stops.try_send(call).is_err() {
                             tracing::debug!("a stop finds many others waiting");

@@ -64,7 +64,7 @@ pub(crate) enum Lane {
 /// Frames kept of each rig, unless the configuration says otherwise: a minute at 30 Hz. A host that was cut off from the others for
 /// half a minute needs 45 s: zenoh takes up to 10 s to notice a dead link, and tries again every 4 s.
 const FRAMES_KEPT: usize = 1_800;
-/// Frames kept of all rigs of a service together, unless the configuration says otherwise: some 30 MB.
+/// Frames kept of all rigs of a service together, unless the configuration says otherwise: some 25 MB, with as many reports of the stage.
 const FRAMES_KEPT_TOGETHER: usize = 76_800;
 /// No configuration may ask for more of each rig: 4 MiB have no room for more frames of 48 elements.
 pub(crate) const FRAMES_KEPT_MAX: usize = 16_000;

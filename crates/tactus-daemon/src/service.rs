@@ -37,16 +37,17 @@ use std::sync::Arc;
 use std::thread;
 
 use clap::{CommandFactory, Parser};
-use tactus_bus::{BusConfig, BusError, Node, TlsConfig};
+use tactus_bus::{BusConfig, BusError, CommandCall, Node, TlsConfig};
 use tactus_log::LogFormat;
 use tactus_runner::config::{ConfigError, ServiceConfig, TlsSection};
-use tactus_runner::open_files;
+use tactus_runner::script_process::ScriptProcesses;
 use tactus_runner::signals::EndingSignals;
+use tactus_runner::{devices, open_files};
 #[cfg(feature = "otel")]
 use tactus_schema::MonoTime;
 use tactus_schema::key::Keys;
 use tokio::runtime::Handle;
-use tokio::sync::watch;
+use tokio::sync::{mpsc, watch};
 use tokio::task::{JoinError, JoinSet};
 use tracing::{Instrument, Span, error, error_span, info};
 
@@ -54,7 +55,7 @@ use crate::inhibitor::{self, Runs};
 use crate::notify::{self, Systemd};
 #[cfg(feature = "otel")]
 use crate::telemetry::{self, Telemetry};
-use rig::{RigError, Service};
+use rig::{Rig, RigError, Service};
 use standing::Standings;
 use stops::Desks;
 
@@ -187,17 +188,11 @@ async fn serve(mut config: ServiceConfig) -> Result<(), ServiceError> {
         desks: Desks::default(),
         standings: Standings::default(),
         runs: Runs::default(),
+        open: Box::new(|rig, service, codec, truth, clock| devices::open(rig, service, codec, truth, clock)),
+        evaluator: Arc::new(ScriptProcesses::of_this_program()),
         ending,
     });
-    // A thread of its own: no task that waits or computes can keep it from running. It ends with the bus.
-    let (desks, runtime) = (service.desks.clone(), Handle::current());
-    thread::Builder::new()
-        .name("stops".into())
-        .spawn(move || {
-            let _entered = runtime.enter();
-            stops::answer(&desks, stops);
-        })
-        .map_err(system("thread"))?;
+    answer_stops(&service.desks, stops).map_err(system("thread"))?;
     let tasks = [
         tokio::spawn(notify::feed_watchdog(service.desks.clone(), systemd.clone())),
         tokio::spawn(inhibitor::keep_awake(service.runs.clone())),
@@ -206,13 +201,7 @@ async fn serve(mut config: ServiceConfig) -> Result<(), ServiceError> {
             async move { standings.tell(&systemd).await }
         }),
     ];
-    let are_several = service.config.rigs.are_several;
-    let mut keeping = JoinSet::new();
-    for rig in rigs {
-        // With one rig its name would only lengthen each line.
-        let span = if are_several { error_span!("rig", name = &*rig.name) } else { Span::none() };
-        keeping.spawn(rig.keep(Arc::clone(&service)).instrument(span));
-    }
+    let mut keeping = keep_all(rigs, &service);
 
     #[cfg(feature = "otel")]
     telemetry::observe({
@@ -246,6 +235,28 @@ async fn serve(mut config: ServiceConfig) -> Result<(), ServiceError> {
     }
     info!("closed");
     closed
+}
+
+/// Starts the thread that answers stops: no task that waits or computes can keep it from running. It ends with the bus.
+fn answer_stops(desks: &Desks, stops: mpsc::Receiver<Box<CommandCall>>) -> std::io::Result<()> {
+    let (desks, runtime) = (desks.clone(), Handle::current());
+    let answering = move || {
+        let _entered = runtime.enter();
+        stops::answer(&desks, stops);
+    };
+    thread::Builder::new().name("stops".into()).spawn(answering).map(drop)
+}
+
+/// Starts a task for each rig, which keeps it up until the service ends.
+fn keep_all(rigs: Vec<Rig>, service: &Arc<Service>) -> JoinSet<Result<(), RigError>> {
+    let are_several = service.config.rigs.are_several;
+    let mut keeping = JoinSet::new();
+    for rig in rigs {
+        // With one rig its name would only lengthen each line.
+        let span = if are_several { error_span!("rig", name = &*rig.name) } else { Span::none() };
+        keeping.spawn(rig.keep(Arc::clone(service)).instrument(span));
+    }
+    keeping
 }
 
 /// How a rig has ended.

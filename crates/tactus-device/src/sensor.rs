@@ -29,7 +29,7 @@ pub trait Sensor: Send {
 #[derive(Debug)]
 pub enum SensorEvent {
     /// The device answered and frames follow. Also comes after each loss.
-    Connected(pb::SensorInfo),
+    Connected(Box<pb::SensorInfo>),
     /// Frames are missing; comes just before the frame that follows the gap.
     Gap(pb::Gap),
     /// One reading.

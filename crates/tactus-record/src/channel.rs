@@ -1,20 +1,16 @@
-//! Encodes messages into the channels of a recording, and decides when their chunks are closed.
+//! The channels of a recording, how its chunks are written, and the writer of copies.
 
 use std::{
     collections::BTreeMap,
     io::{self, BufWriter, Write},
-    sync::{Arc, Mutex, PoisonError},
+    sync::Arc,
     time::Duration,
 };
 
-use mcap::{Compression, McapError, WriteOptions, records::MessageHeader, write::NoSeek};
-use tactus_schema::{DESCRIPTOR_SET, TimeStamp, key::Keys};
+use mcap::{Compression, McapError, WriteOptions, write::NoSeek};
+use tactus_schema::{DESCRIPTOR_SET, key::Keys};
 
-use crate::{
-    MessageKind,
-    header::{Header, LIBRARY},
-    message::Recorded,
-};
+use crate::{MessageKind, header::LIBRARY};
 
 /// A chunk is closed and handed to the system once it spans this much time. A reader cannot use a partial chunk, so a
 /// killed process loses this much.
@@ -26,39 +22,8 @@ pub(crate) const CHUNK_BYTES: u64 = 256 * 1024;
 /// Name of a protobuf schema's and message's encoding in MCAP.
 pub(crate) const PROTOBUF: &str = "protobuf";
 
-/// Encodes the messages of one run as an MCAP stream. It gives out whole records only.
-pub(crate) struct ChannelWriter {
-    mcap: mcap::Writer<NoSeek<Spool>>,
-    closed: Spool,
-    /// Channels by kind of message.
-    ids: ChannelIds,
-    encoded: Vec<u8>,
-    chunk_began: Option<TimeStamp>,
-}
-
 /// Channels by kind of message, in the order of [`MessageKind::ALL`].
 pub(crate) type ChannelIds = [u16; MessageKind::ALL.len()];
-
-/// Bytes in memory: writing to it never fails, so the encoder can go on when a disk cannot.
-#[derive(Debug, Clone, Default)]
-struct Spool(Arc<Mutex<Vec<u8>>>);
-
-impl Spool {
-    fn take(&self) -> Vec<u8> {
-        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-}
-
-impl Write for Spool {
-    fn write(&mut self, piece: &[u8]) -> io::Result<usize> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(piece);
-        Ok(piece.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
 
 /// How recordings are written.
 ///
@@ -71,7 +36,7 @@ impl Write for Spool {
 /// | none | 1,100,000 | 276 |
 /// | zstd 1 | 500,000 | 122 |
 /// | zstd 3 | 490,000 | 119 |
-pub(crate) fn options() -> WriteOptions {
+fn options() -> WriteOptions {
     WriteOptions::new()
         .compression(Some(Compression::Zstd))
         .compression_level(1)
@@ -80,7 +45,12 @@ pub(crate) fn options() -> WriteOptions {
         .chunk_size(Some(CHUNK_BYTES))
         // A chunk is assembled in memory and written at once, so that the file never contains a partial header.
         .disable_seeking(true)
-        .library(format!("{LIBRARY} {}", env!("CARGO_PKG_VERSION")))
+        .library(library())
+}
+
+/// Name of the program in a file's header.
+pub(crate) fn library() -> String {
+    format!("{LIBRARY} {}", env!("CARGO_PKG_VERSION"))
 }
 
 /// An MCAP writer over a sink that is written to in large pieces.
@@ -89,64 +59,6 @@ pub(crate) fn writer<W: Write>(sink: W) -> Result<mcap::Writer<NoSeek<BufWriter<
         usize::try_from(CHUNK_BYTES).unwrap_or(usize::MAX),
         sink,
     )))
-}
-
-impl ChannelWriter {
-    /// Begins a recording with its metadata, attachments, schemas and channels.
-    pub(crate) fn new(header: &Header<'_>) -> Result<Self, McapError> {
-        let closed = Spool::default();
-        let mut mcap = options().create(NoSeek::new(closed.clone()))?;
-        mcap.write_metadata(&header.metadata().to_record())?;
-        for attachment in header.attachments() {
-            mcap.attach(&mcap::Attachment {
-                log_time: unsigned(attachment.written.ns()),
-                create_time: unsigned(attachment.written.ns()),
-                name: attachment.name,
-                media_type: attachment.media_type,
-                data: attachment.data.into(),
-            })?;
-        }
-        let ids = declare(&mut mcap, &Keys::new(header.rig.name.clone()))?;
-        mcap.flush()?;
-        Ok(Self { mcap, closed, ids, encoded: Vec::new(), chunk_began: None })
-    }
-
-    /// The whole records that were finished since the last call.
-    pub(crate) fn take_closed(&mut self) -> Vec<u8> {
-        self.closed.take()
-    }
-
-    /// Closes the current chunk.
-    pub(crate) fn close_chunk(&mut self) -> Result<(), McapError> {
-        self.chunk_began = None;
-        self.mcap.flush()
-    }
-
-    /// Closes the current chunk and writes the summary and the end mark. Nothing may follow.
-    pub(crate) fn finish(&mut self) -> Result<(), McapError> {
-        self.mcap.finish().map(drop)
-    }
-
-    /// Writes a message to the channel of its kind, and first closes the current chunk if it spans [`CHUNK_SPAN`].
-    pub(crate) fn write<M: Recorded>(
-        &mut self,
-        message: &M,
-        seq: u64,
-        at: TimeStamp,
-    ) -> Result<(), McapError> {
-        // A clock that runs backwards closes the chunk, too.
-        let spans = |began: TimeStamp| at.mono < began.mono || at.mono.since(began.mono) >= CHUNK_SPAN;
-        if self.chunk_began.is_some_and(spans) {
-            self.close_chunk()?;
-        }
-        self.chunk_began.get_or_insert(at);
-        self.encoded.clear();
-        message.encode(&mut self.encoded);
-        let channel_id = self.ids[M::KIND as usize];
-        let log_time = unsigned(at.wall.ns());
-        let header = MessageHeader { channel_id, sequence: wrapped(seq), log_time, publish_time: log_time };
-        self.mcap.write_to_known_channel(&header, &self.encoded)
-    }
 }
 
 /// Declares the channel of every kind of message. In an empty file they get the ids 1, 2, 3, ...: [`standard_channel`]

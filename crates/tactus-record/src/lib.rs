@@ -20,10 +20,12 @@ pub mod space;
 pub mod table;
 pub mod tail;
 
+mod bytes;
 mod channel;
 mod chunk;
 mod clock;
 mod completeness;
+mod compressor;
 mod confirmed;
 mod error;
 mod export;
@@ -37,6 +39,7 @@ mod recover;
 mod rig_groups;
 mod scan;
 mod storage;
+mod stream;
 mod tally;
 mod timeline;
 

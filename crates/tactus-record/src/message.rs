@@ -110,7 +110,7 @@ macro_rules! kinds {
             #[cfg(test)]
             pub(crate) fn write(
                 &self,
-                writer: &mut crate::channel::ChannelWriter,
+                writer: &mut crate::stream::ChannelWriter,
                 at: TimeStamp,
             ) -> Result<(), mcap::McapError> {
                 match self {

@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use tactus_schema::{MonoTime, Rig, TimeStamp, WallTime};
 
 use super::{Message, MessageKind};
-use crate::{Entry, Header, Reader, Script, channel::ChannelWriter};
+use crate::{Entry, Header, Reader, Script, stream::ChannelWriter};
 
 const RIG_TOML: &str = include_str!("../../../config/rigs/sim.toml");
 

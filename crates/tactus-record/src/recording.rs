@@ -12,12 +12,12 @@ use tactus_schema::{
 
 use crate::{
     MessageKind, RecordError, Tally, Timed,
-    channel::ChannelWriter,
     error::Missing,
     header::Header,
     message::Recorded,
     space::{INDEX_BYTES_PER_CHUNK, end_bytes},
     storage::{FileStorage, Storage, SyncHandle},
+    stream::ChannelWriter,
 };
 
 /// One run being written to an MCAP file.

@@ -65,7 +65,7 @@ pub struct BusSection {
     /// Names of rigs whose services connect to this one.
     #[serde(default)]
     pub guests: Vec<String>,
-    /// Frames that are kept in memory of each rig, for clients that join late or were cut off: 1 to 16,000, each some 400 bytes with 48
+    /// Frames that are kept in memory of each rig, for clients that join late or were cut off: 1 to 16,000, each some 250 bytes with 48
     /// elements. Default: 1,800, a minute at 30 Hz; with more than 42 rigs fewer, 76,800 of all.
     #[serde(default)]
     pub frames_kept: Option<usize>,

@@ -136,13 +136,14 @@ enum QueueError {
     Lossy { path: String, missing: Missing },
 }
 
+/// What is queued. The queue takes memory for 31 entries at once: only what comes many times a second stands in it.
 #[derive(Debug)]
 enum Entry {
-    SensorInfo(pb::SensorInfo, TimeStamp),
+    SensorInfo(Box<(pb::SensorInfo, TimeStamp)>),
     Frame(Frame),
     Stage(pb::StageState),
-    Event(pb::RunEvent),
-    Safety(pb::SafetyEvent),
+    Event(Box<pb::RunEvent>),
+    Safety(Box<pb::SafetyEvent>),
 }
 
 impl Record for DirectRecorder {
@@ -420,7 +421,7 @@ impl ThreadRecorder {
 
 impl Record for ThreadRecorder {
     fn sensor_info(&mut self, info: &pb::SensorInfo, at: TimeStamp) -> Result<(), RecordFailure> {
-        self.queue(Entry::SensorInfo(info.clone(), at))
+        self.queue(Entry::SensorInfo(Box::new((info.clone(), at))))
     }
 
     fn frame(&mut self, frame: &Frame) -> Result<(), RecordFailure> {
@@ -432,11 +433,11 @@ impl Record for ThreadRecorder {
     }
 
     fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure> {
-        self.queue(Entry::Event(event.clone()))
+        self.queue(Entry::Event(Box::new(event.clone())))
     }
 
     fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure> {
-        self.queue(Entry::Safety(event.clone()))
+        self.queue(Entry::Safety(Box::new(event.clone())))
     }
 
     fn check(&mut self, now: MonoTime) -> Result<(), RecordFailure> {
@@ -457,9 +458,9 @@ impl Entry {
     fn bytes(&self) -> u64 {
         let text = match self {
             Self::Frame(frame) => size_of_val(&*frame.counts),
-            Self::Event(event) => prost::Message::encoded_len(event),
-            Self::Safety(event) => prost::Message::encoded_len(event),
-            Self::SensorInfo(info, _) => prost::Message::encoded_len(info),
+            Self::Event(event) => prost::Message::encoded_len(&**event),
+            Self::Safety(event) => prost::Message::encoded_len(&**event),
+            Self::SensorInfo(told) => prost::Message::encoded_len(&told.0),
             Self::Stage(_) => 0,
         };
         (size_of::<Self>() + text) as u64
@@ -467,7 +468,7 @@ impl Entry {
 
     fn at(&self) -> MonoTime {
         match self {
-            Self::SensorInfo(_, at) => at.mono,
+            Self::SensorInfo(told) => told.1.mono,
             Self::Frame(frame) => frame.received.mono,
             Self::Stage(state) => MonoTime::from_ns(state.t_mono_ns),
             Self::Event(event) => MonoTime::from_ns(event.t_mono_ns),
@@ -542,11 +543,11 @@ impl<S: Storage> Writer<S> {
         self.at = self.at.max(entry.at());
         self.wish_for_sync();
         match entry {
-            Entry::SensorInfo(info, at) => self.recording.write_sensor_info(info, *at),
+            Entry::SensorInfo(told) => self.recording.write_sensor_info(&told.0, told.1),
             Entry::Frame(frame) => self.recording.write(frame),
             Entry::Stage(state) => self.recording.write(state),
-            Entry::Event(event) => self.recording.write(event),
-            Entry::Safety(event) => self.recording.write(event),
+            Entry::Event(event) => self.recording.write(&**event),
+            Entry::Safety(event) => self.recording.write(&**event),
         }
     }
 

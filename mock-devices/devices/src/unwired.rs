@@ -131,7 +131,7 @@ impl Sensor for UnwiredSensor {
     fn poll_next(&mut self, context: &mut Context<'_>) -> Poll<SensorEvent> {
         if !self.is_connected {
             self.is_connected = true;
-            return Poll::Ready(SensorEvent::Connected(self.info.clone()));
+            return Poll::Ready(SensorEvent::Connected(Box::new(self.info.clone())));
         }
         ready!(self.sampling.as_mut().poll(context));
         self.seq += 1;

@@ -24,8 +24,9 @@ fn status() -> Vec<u8> {
 }
 
 /// Answers every call with its own command and request.
-async fn echo(mut calls: mpsc::Receiver<CommandCall>) {
-    while let Some(CommandCall { command, request, reply, .. }) = calls.recv().await {
+async fn echo(mut calls: mpsc::Receiver<Box<CommandCall>>) {
+    while let Some(call) = calls.recv().await {
+        let CommandCall { command, request, reply, .. } = *call;
         let version = format!("{command:?} {request:?}");
         reply.reply(pb::CommandReply { ok: true, rig: "bench".to_owned(), version, ..Default::default() });
     }

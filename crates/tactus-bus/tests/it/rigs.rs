@@ -18,7 +18,7 @@ use crate::lab::{frame, free_endpoint};
 const PATIENCE: Duration = Duration::from_hours(1);
 
 /// A node for these rigs, and where all their stops arrive.
-async fn node(rigs: &[&str]) -> (Arc<Node>, mpsc::Receiver<CommandCall>, Endpoint) {
+async fn node(rigs: &[&str]) -> (Arc<Node>, mpsc::Receiver<Box<CommandCall>>, Endpoint) {
     let keys: Vec<_> = rigs.iter().map(|&rig| Keys::new(rig)).collect();
     loop {
         let endpoint = free_endpoint();
@@ -33,7 +33,7 @@ async fn node(rigs: &[&str]) -> (Arc<Node>, mpsc::Receiver<CommandCall>, Endpoin
 }
 
 /// Answers each command with the rig that it came to.
-async fn answer(mut commands: mpsc::Receiver<CommandCall>) {
+async fn answer(mut commands: mpsc::Receiver<Box<CommandCall>>) {
     while let Some(call) = commands.recv().await {
         let rig = call.rig.as_deref().unwrap_or("all").to_owned();
         call.reply.reply(pb::CommandReply { ok: true, rig, ..Default::default() });

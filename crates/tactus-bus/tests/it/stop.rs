@@ -22,7 +22,7 @@ fn request() -> pb::CommandRequest {
 }
 
 /// Answers each stop for its rig, and tells who sent it.
-fn answer(rig: &str, mut stops: mpsc::Receiver<CommandCall>) -> mpsc::Receiver<Request> {
+fn answer(rig: &str, mut stops: mpsc::Receiver<Box<CommandCall>>) -> mpsc::Receiver<Request> {
     let (told, asked) = mpsc::channel(1_000);
     let rig = rig.to_owned();
     tokio::spawn(async move {

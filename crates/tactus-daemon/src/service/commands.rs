@@ -15,7 +15,6 @@ use tactus_runner::config::RigFiles;
 use tactus_runner::continuation::{self, ContinuationError, Wish};
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::recorder::{Gauge, ThreadRecorder};
-use tactus_runner::script_process::ScriptProcesses;
 use tactus_runner::twin::{Attend, DryRun, SoFar};
 use tactus_runner::{experiments, twin};
 use tactus_schema::key::Command;
@@ -99,8 +98,12 @@ struct Refusal {
 }
 
 impl CommandDesk {
-    pub(super) fn new(engine: Engine, places: Places, publisher: Publisher) -> Self {
-        let evaluator = Arc::new(ScriptProcesses::of_this_program());
+    pub(super) fn new(
+        engine: Engine,
+        places: Places,
+        publisher: Publisher,
+        evaluator: Arc<dyn Evaluate>,
+    ) -> Self {
         let recorder = watch::Sender::default();
         let (plans, listing) = (Arc::default(), Arc::new(Semaphore::new(1)));
         let (lease, hanging) = (Mutex::default(), Mutex::default());
@@ -142,8 +145,9 @@ impl CommandDesk {
     }
 
     /// Answers until the channel is closed.
-    pub(super) async fn answer_commands(self: &Arc<Self>, commands: &mut mpsc::Receiver<CommandCall>) {
+    pub(super) async fn answer_commands(self: &Arc<Self>, commands: &mut mpsc::Receiver<Box<CommandCall>>) {
         while let Some(call) = commands.recv().await {
+            let call = *call;
             match (call.command, call.request) {
                 (Command::Run, Request::Run(request)) => {
                     // A dry run takes a while: other commands are answered meanwhile.

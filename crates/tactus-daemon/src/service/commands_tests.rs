@@ -41,12 +41,16 @@ async fn lab(listen: Vec<Endpoint>) -> (Bus, Calls, CommandDesk) {
     let opened = devices::open(&rig, &service, codec, || Truth::of_rig(&rig, 1), clock);
     let engine = Engine::start(rig, opened.devices, clock, Arc::new(Unpublished)).unwrap();
     let places = Places { files, recordings: config.recordings, experiments: config.experiments };
-    let desk = CommandDesk::new(engine, places, bus.publisher());
+    // The test's program has no main function that evaluates scripts.
+    let desk = CommandDesk::new(engine, places, bus.publisher(), Arc::new(tactus_plan::InThisProcess));
     (bus, calls, desk)
 }
 
 /// Answers the commands of a desk.
-fn answer(desk: &Arc<CommandDesk>, mut commands: tokio::sync::mpsc::Receiver<CommandCall>) -> JoinHandle<()> {
+fn answer(
+    desk: &Arc<CommandDesk>,
+    mut commands: tokio::sync::mpsc::Receiver<Box<CommandCall>>,
+) -> JoinHandle<()> {
     let desk = Arc::clone(desk);
     tokio::spawn(async move { desk.answer_commands(&mut commands).await })
 }
@@ -180,9 +184,7 @@ fn press_of(depth_mm: f64) -> pb::RunRequest {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_plan_says_what_the_rig_can_do_without_a_lease_and_moves_nothing() {
-    let (_bus, _calls, mut desk) = lab(Vec::new()).await;
-    // The test's program has no main function that evaluates scripts.
-    desk.evaluator = Arc::new(tactus_plan::InThisProcess);
+    let (_bus, _calls, desk) = lab(Vec::new()).await;
     let plan = desk.plan(press_of(0.1)).await.map_err(|refusal| refusal.error).unwrap();
     assert_eq!((plan.exit_status(), plan.presses, plan.dwells), (pb::ExitStatus::Done, 1, 1), "{plan:?}");
     assert!(
@@ -201,7 +203,6 @@ async fn a_plan_says_what_the_rig_can_do_without_a_lease_and_moves_nothing() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_experiments_are_listed_with_their_parameters_one_list_at_a_time() {
     let (_bus, _calls, mut desk) = lab(Vec::new()).await;
-    desk.evaluator = Arc::new(tactus_plan::InThisProcess);
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("broken.star"), "def run(rig):\n    pass\nparam(1)\n").unwrap();
     desk.places.experiments = Some(folder.path().to_owned());

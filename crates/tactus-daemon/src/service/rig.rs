@@ -9,14 +9,16 @@ use std::time::{Duration, SystemTime};
 
 use futures_util::FutureExt;
 use tactus_bus::{Bus, BusError, CommandCall, Node};
-use tactus_device::Clock;
+use tactus_device::{Clock, SensorCodec};
 use tactus_engine::{Engine, EngineError, StopOrder};
+use tactus_plan::Evaluate;
 use tactus_runner::config::{RigFiles, Rigs, ServiceConfig};
 use tactus_runner::covering_file::CoveringFile;
+use tactus_runner::crashed;
+use tactus_runner::devices::OpenedRig;
 use tactus_runner::embedded::Truth;
-use tactus_runner::{crashed, devices};
 use tactus_schema::key::{Command, Keys};
-use tactus_schema::pb;
+use tactus_schema::{Rig as RigDescription, pb, rig};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{interval, sleep, timeout};
 use tracing::{error, info, warn};
@@ -40,9 +42,17 @@ pub(super) struct Service {
     pub(super) desks: Desks,
     pub(super) standings: Standings,
     pub(super) runs: Runs,
+    pub(super) open: OpenDevices,
+    /// Evaluates scripts.
+    pub(super) evaluator: Arc<dyn Evaluate>,
     /// Why the service ends, once it does.
     pub(super) ending: watch::Receiver<Option<&'static str>>,
 }
+
+/// Starts a rig's devices, as [`tactus_runner::devices::open`] does.
+pub(super) type OpenDevices = Box<
+    dyn Fn(&RigDescription, &rig::Service, SensorCodec, &dyn Fn() -> Truth, Clock) -> OpenedRig + Send + Sync,
+>;
 
 /// One rig, as the configuration has it.
 pub(super) struct Rig {
@@ -50,7 +60,7 @@ pub(super) struct Rig {
     /// What is known of it.
     pub(super) state: State,
     pub(super) bus: Bus,
-    pub(super) commands: mpsc::Receiver<CommandCall>,
+    pub(super) commands: mpsc::Receiver<Box<CommandCall>>,
 }
 
 /// Whether a rig can be started.
@@ -166,7 +176,7 @@ impl Rig {
             return Err(EngineError::NoService { rig: rig.name }.into());
         };
         let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
-        let mut opened = devices::open(&rig, &rig_service, codec, truth, clock);
+        let mut opened = (service.open)(&rig, &rig_service, codec, &truth, clock);
         if opened.devices.change_covering.is_none() {
             // A person changes the covering, and may do so while the service is down.
             opened.devices.covering_memory = Some(Arc::new(CoveringFile::of(&rig.name, &recordings)));
@@ -175,7 +185,8 @@ impl Rig {
         let engine = Engine::start(rig, opened.devices, clock, Arc::new(BusPublisher(publisher.clone())))?;
         let places =
             Places { files: Arc::clone(files), recordings, experiments: service.config.experiments.clone() };
-        let desk = Arc::new(CommandDesk::new(engine.clone(), places, publisher.clone()));
+        let evaluator = Arc::clone(&service.evaluator);
+        let desk = Arc::new(CommandDesk::new(engine.clone(), places, publisher.clone(), evaluator));
         service.desks.add(&self.name, &desk);
 
         let (bus, commands, name) = (&self.bus, &mut self.commands, &self.name);
@@ -309,3 +320,7 @@ async fn end_run(engine: &Engine, by: &str, reason: String) -> Result<(), Failur
     engine.stop(StopOrder { by: by.into(), reason, abort: false });
     timeout(CLOSING_TIMEOUT, engine.released()).await.map_err(|_| Failure::Hung)
 }
+
+#[cfg(test)]
+#[path = "rig_tests.rs"]
+mod tests;

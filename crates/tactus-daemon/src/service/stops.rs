@@ -39,13 +39,13 @@ impl Desks {
 
 /// Blocks a thread of its own: stops want neither a lease nor a free task. All that wait are done before the first is answered,
 /// because an answer may wait for its client.
-pub(super) fn answer(desks: &Desks, mut stops: mpsc::Receiver<CommandCall>) {
+pub(super) fn answer(desks: &Desks, mut stops: mpsc::Receiver<Box<CommandCall>>) {
     while let Some(first) = stops.blocking_recv() {
         let mut calls = vec![first];
         while let Ok(call) = stops.try_recv() {
             calls.push(call);
         }
-        let stop = |call: CommandCall| {
+        let stop = |call: Box<CommandCall>| {
             let concerned = desks.of(call.rig.as_deref());
             for (_, desk) in &concerned {
                 desk.stop(&call.request);

@@ -243,7 +243,7 @@ impl Driver {
     async fn connected(&mut self, info: pb::SensorInfo, identity: Option<String>) -> Result<(), Unread> {
         self.reported_loss = None;
         tracing::info!(device = self.device, identity, "sensor connected");
-        self.emit(SensorEvent::Connected(info)).await
+        self.emit(SensorEvent::Connected(Box::new(info))).await
     }
 
     /// Makes a frame from a reading. `together` counts it and the readings behind it that arrived at the same time.

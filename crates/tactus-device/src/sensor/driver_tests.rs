@@ -93,7 +93,7 @@ async fn gap(sensor: &mut SensorDriver) -> pb::Gap {
 async fn connected(sensor: &mut SensorDriver) -> pb::SensorInfo {
     let event = sensor.next().await;
     let SensorEvent::Connected(info) = event else { panic!("not connected: {event:?}") };
-    info
+    *info
 }
 
 async fn lost(sensor: &mut SensorDriver) -> (ErrorKind, String) {

@@ -68,11 +68,11 @@ struct FakeSensor {
 impl Sensor for FakeSensor {
     fn poll_next(&mut self, context: &mut Context<'_>) -> Poll<SensorEvent> {
         if !std::mem::replace(&mut self.told, true) {
-            return Poll::Ready(SensorEvent::Connected(pb::SensorInfo {
+            return Poll::Ready(SensorEvent::Connected(Box::new(pb::SensorInfo {
                 rows: 6,
                 cols: 8,
                 ..Default::default()
-            }));
+            })));
         }
         if let Some(frame) = self.pending.take() {
             return Poll::Ready(SensorEvent::Frame(frame));

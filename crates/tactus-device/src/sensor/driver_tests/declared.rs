@@ -92,7 +92,7 @@ impl TestBench {
     async fn connected(&mut self) -> pb::SensorInfo {
         let event = self.sensor.next().await;
         let SensorEvent::Connected(info) = event else { panic!("not connected: {event:?}") };
-        info
+        *info
     }
 
     async fn read(&mut self) -> Frame {

@@ -150,7 +150,7 @@ fn next(first: &Endpoint, copy: u32) -> anyhow::Result<Endpoint> {
 }
 
 /// Refuses all commands: there is only a sensor.
-async fn refuse(mut calls: mpsc::Receiver<CommandCall>) {
+async fn refuse(mut calls: mpsc::Receiver<Box<CommandCall>>) {
     while let Some(call) = calls.recv().await {
         call.reply.reply(pb::CommandReply {
             ok: false,
