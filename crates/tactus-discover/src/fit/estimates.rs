@@ -89,6 +89,9 @@ fn shared_errors(elimination: &Elimination, predicted: &Total) -> f64 {
     let count = elimination.reduced.nrows() - 1;
     let is_shown = |one: &usize| elimination.reduced[(*one, *one)] > SHOWN_LEAST * elimination.whole[*one];
     let shown: Vec<usize> = (0..count).filter(is_shown).collect();
+    if shown.is_empty() {
+        return 0.0;
+    }
     let of = |matrix: &DMatrix<f64>| {
         DMatrix::from_fn(shown.len(), shown.len(), |i, j| matrix[(shown[i], shown[j])])
     };

@@ -1,6 +1,8 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use tactus_schema::table::RowView;
 
+use crate::Frames;
 use crate::fit::Prepared;
 use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
 
@@ -63,4 +65,28 @@ fn the_error_of_folds_is_that_of_fits_to_fewer_presses() {
         found += squares / readings;
     }
     assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+}
+
+/// Presses of one place tell nothing of the spread, so that the base model has only gains and baselines.
+#[test]
+fn a_model_without_shared_numbers_has_the_errors_of_gains_and_baselines() {
+    let known = known();
+    let silent = processes(ELEMENTS, 0.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(0));
+    let clean = measured(&known, &[], &silent);
+    let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(3));
+    let mut frames = Frames::new(ELEMENTS);
+    for ((place, row), noise) in clean.rows().enumerate().zip(&noise) {
+        let first = place % 30;
+        #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
+        let counts: Vec<f32> =
+            clean.counts_of(first).iter().zip(noise).map(|(counts, noise)| counts + *noise as f32).collect();
+        frames.push(RowView { position_mm: clean.position_mm[first], counts: &counts, ..row });
+    }
+    let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
+    let problem = prepared.problem();
+    assert!(problem.free(&prepared.base.parameters).is_empty());
+    let held_out = problem.estimation_error(&prepared.base).unwrap().unwrap();
+    let folds = problem.by_folds(&prepared.base).unwrap().unwrap().estimation_error;
+    // A gain and a baseline for each of 32 presses of 30 frames, or of four fifths of them.
+    assert!(held_out > 0.0 && folds > held_out && folds < 2.0 * held_out, "{held_out} {folds}");
 }
