@@ -29,6 +29,8 @@ mod compressor;
 mod confirmed;
 mod error;
 mod export;
+#[cfg(test)]
+mod fixtures;
 mod header;
 mod info;
 mod layout;

@@ -1,30 +1,11 @@
-use std::collections::BTreeMap;
-
-use tactus_schema::{MonoTime, Rig, TimeStamp, WallTime};
+use tactus_schema::{MonoTime, TimeStamp, WallTime};
 
 use super::{Message, MessageKind};
-use crate::{Entry, Header, Reader, Script, stream::ChannelWriter};
-
-const RIG_TOML: &str = include_str!("../../../config/rigs/sim.toml");
+use crate::{Entry, Reader, fixtures::with_header, stream::ChannelWriter};
 
 #[test]
 fn every_kind_of_the_list_is_written_to_its_channel_and_read_back() {
-    let rig = Rig::from_toml(RIG_TOML).unwrap();
-    let header = Header {
-        run_id: "r1",
-        experiment: "corners",
-        who: "ada",
-        rig: &rig,
-        rig_toml: None,
-        link_toml: None,
-        script: Script { name: "corners.star", source: "" },
-        versions: &BTreeMap::new(),
-        parameters_json: "{}",
-        started: WallTime::from_ns(1),
-        simulated: true,
-        continues: None,
-    };
-    let mut writer = ChannelWriter::new(&header).unwrap();
+    let mut writer = with_header(ChannelWriter::new).unwrap();
     let at = TimeStamp { mono: MonoTime::from_ns(1), wall: WallTime::from_ns(2) };
     for message in Message::empty() {
         message.write(&mut writer, at).unwrap();

@@ -1,19 +1,16 @@
 use std::{
-    collections::BTreeMap,
     fs, io,
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
 };
 
-use tactus_schema::{Frame, Rig, WallTime, pb};
+use tactus_schema::{Frame, pb};
 
 use super::Recording;
 use crate::{
-    Completeness, Entry, Header, Message, Missing, Reader, RecordError, Script, Storage, SyncHandle,
-    channel::CHUNK_SPAN,
+    Completeness, Entry, Message, Missing, Reader, RecordError, Storage, SyncHandle, channel::CHUNK_SPAN,
+    fixtures::with_header,
 };
-
-const RIG_TOML: &str = include_str!("../../../config/rigs/sim.toml");
 
 /// Accepts bytes up to a limit, as a disk does, and shows them. The reserve takes some of the space.
 #[derive(Clone)]
@@ -75,23 +72,6 @@ impl Storage for Disk {
     fn close(&mut self) -> Result<u64, RecordError> {
         Ok(self.bytes().len() as u64)
     }
-}
-
-fn with_header<T>(use_it: impl FnOnce(&Header<'_>) -> T) -> T {
-    use_it(&Header {
-        run_id: "r1",
-        experiment: "corners",
-        who: "ada",
-        rig: &Rig::from_toml(RIG_TOML).unwrap(),
-        rig_toml: Some(RIG_TOML),
-        link_toml: Some("schema = \"tactus.link/1\""),
-        script: Script { name: "corners.star", source: "" },
-        versions: &BTreeMap::new(),
-        parameters_json: "{}",
-        started: WallTime::from_ns(1),
-        simulated: true,
-        continues: None,
-    })
 }
 
 fn begin(disk: &Disk) -> Result<Recording<Disk>, RecordError> {

@@ -1,32 +1,14 @@
-use std::{collections::BTreeMap, io::Cursor};
+use std::io::Cursor;
 
 use mcap::records::MessageHeader;
-use tactus_schema::{Frame, MonoTime, Rig, TimeStamp, WallTime, key::Keys, pb};
+use tactus_schema::{Frame, MonoTime, TimeStamp, WallTime, key::Keys, pb};
 
 use super::{ChannelWriter, Packing};
 use crate::{
-    Header, Recorded, Script,
+    Recorded,
     channel::{declare, library, unsigned},
+    fixtures::with_header,
 };
-
-const RIG_TOML: &str = include_str!("../../../config/rigs/sim.toml");
-
-fn with_header<T>(use_it: impl FnOnce(&Header<'_>) -> T) -> T {
-    use_it(&Header {
-        run_id: "r1",
-        experiment: "corners",
-        who: "ada",
-        rig: &Rig::from_toml(RIG_TOML).unwrap(),
-        rig_toml: Some(RIG_TOML),
-        link_toml: None,
-        script: Script { name: "corners.star", source: "" },
-        versions: &BTreeMap::new(),
-        parameters_json: "{}",
-        started: WallTime::from_ns(1),
-        simulated: true,
-        continues: None,
-    })
-}
 
 fn at(number: u64) -> TimeStamp {
     let ns = i64::try_from(number).unwrap() * 33_333_333;
