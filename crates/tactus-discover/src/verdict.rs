@@ -26,6 +26,7 @@
 //! | closed.rs | `MOST_ERRORS` | `2.0` | convention | two standard errors |
 //! | confirmed.rs | `CONFIRMED_P` | `0.05` | convention | 5 %: a name has held its place before |
 //! | confirmed.rs | `AGREED` | `1.5` | derived | between the least p that flips can give and twice that |
+//! | drafting.rs | `BETTER_PART` | `0.5` | convention | what closes less is not what is left; on tuning sets right drafts outside close 0.67 and more, those beside a right name mostly less than 0.35 (decision 0058) |
 //! | drafting.rs | `CLOSED_LEAST` | `0.7` | convention | the 70 % that the targets ask of a draft |
 //! | drafting.rs | `CONFIRMED_LEAST` | `0.8` | convention | more than of a draft; not measured |
 //! | drafting.rs | `STRENGTH_APART` | `0.3` | convention | three tenths; not measured |

@@ -46,6 +46,18 @@ impl Term {
         Self { definition, values, knots: None, tables: Vec::new() }
     }
 
+    /// A draft as it was drafted.
+    pub(crate) fn of_draft(definition: &'static Definition) -> Self {
+        let mut term = Self::neutral(definition);
+        term.values[0] = 1.0;
+        term
+    }
+
+    /// The strength of a draft, and of a tone what is a quarter of a period ahead.
+    pub(crate) fn strength_of_draft(&self) -> [f64; 2] {
+        [self.values[0], self.values.get(1).copied().unwrap_or(0.0)]
+    }
+
     pub(crate) fn effect(&self) -> Result<Effect, DiscoverError> {
         let known = self.definition.parameters.iter().enumerate();
         let acting = known.filter(|(parameter, _)| self.acts(*parameter));

@@ -89,7 +89,7 @@ impl Drafted {
 }
 
 /// Why there is no draft.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum NoDraft {
     /// Noise would give as much to some draft.
     Noise,
@@ -103,6 +103,13 @@ pub enum NoDraft {
     NoGain,
     /// With it the model is further from presses that its fit has not seen.
     Further,
+    /// On such presses it closes the smaller part of what is left.
+    SmallerPart {
+        /// What it would have said.
+        sentence: String,
+        /// The share.
+        share: f64,
+    },
     /// The fitted presses leave nothing to draft: what is left shows on the held-out presses alone.
     OnlyHeldOut,
     /// It acts where a name acts, and so little that it may be an error of the name's form.
@@ -121,6 +128,10 @@ impl NoDraft {
             Self::Further => {
                 "what comes first takes the model further from presses that its fit has not seen".into()
             }
+            Self::SmallerPart { sentence, share } => format!(
+                "what comes first closes {:.0} % of what is left on presses that its fit has not seen: {sentence}",
+                100.0 * share
+            ),
             Self::OnlyHeldOut => {
                 "the fitted presses leave nothing to draft: what is left shows on the held-out presses alone"
                     .into()
@@ -520,20 +531,21 @@ impl Search<'_> {
         Ok(Some(Arc::new(weights)))
     }
 
-    /// The draft as a term of the model, with its law scaled so that its strength is 1; `None` if it does not come nearer to the data.
+    /// The draft as a term of the model, with its law as it is fitted, so that its strength is 1; `None` if it does not come nearer to the data.
     fn taken(&self, at: &Fitted, draft: Draft) -> Result<Option<(Draft, Fitted, f64)>, DiscoverError> {
-        let term = Term { values: vec![1.0], ..Term::neutral(draft.clone().define()?) };
+        let term = Term::of_draft(draft.clone().define()?);
         let fitted = self.problem.fit_from(at.parameters.with(term), POLISH_ROUNDS)?;
-        let strength = fitted.parameters.terms.last().map_or(0.0, |term| term.values[0]);
-        if strength <= 0.0 || fitted.cost >= at.cost {
+        let [along, quadrature] = fitted.parameters.terms.last().map_or([0.0; 2], Term::strength_of_draft);
+        let strength = along.hypot(quadrature);
+        if along <= 0.0 || fitted.cost >= at.cost {
             return Ok(None);
         }
-        let draft = Draft { law: curves::scaled(&draft.law, strength), ..draft };
+        let draft = Draft { law: draft.law.turned([along, quadrature]), ..draft };
         let draft = Draft { sentence: words::sentence(&draft), ..draft };
         // The prediction is the same: a draft is its strength times its law.
         let mut parameters = fitted.parameters;
         if let Some(last) = parameters.terms.last_mut() {
-            *last = Term { values: vec![1.0], ..Term::neutral(draft.clone().define()?) };
+            *last = Term::of_draft(draft.clone().define()?);
         }
         let mut errors = fitted.errors;
         errors.last_mut().into_iter().flatten().for_each(|error| *error /= strength);

@@ -32,7 +32,7 @@ pub struct Closed {
 }
 
 /// Standard errors from a share to the most that it may be.
-const MOST_ERRORS: f64 = 2.0;
+pub(super) const MOST_ERRORS: f64 = 2.0;
 
 /// Sums over a press: of what is closed, of what lasts in the second residual, and of its squares less the noise's.
 type OfPress = [Sums; 3];

@@ -3,15 +3,19 @@
 use tactus_model::Effect;
 use tactus_model::effect::{Definition, Draft};
 
-use super::closed::Closed;
+use super::closed::{Closed, MOST_ERRORS};
 use super::discovery::{BaseModel, Verdict};
-use super::residual::Residual;
+use super::residual::{Presses, Residual};
 use crate::data::{DiscoverError, Floor};
 use crate::fit::{Fitted, Prepared, Term};
-use crate::search::{ALPHA, Against, Drafted, FLIPS, Outcome, POLISH_ROUNDS, Rule, Search, sign_flip_p};
+use crate::search::{
+    ALPHA, Against, Drafted, FLIPS, NoDraft, Outcome, POLISH_ROUNDS, Rule, Search, sign_flip_p,
+};
 
 /// A draft that closes less of what was left on held-out presses is partial.
 const CLOSED_LEAST: f64 = 0.7;
+/// A draft describes what is left if it closes the better part of it on presses that no fit has seen.
+const BETTER_PART: f64 = 0.5;
 
 /// An effect that was drafted, because no class explains what is left.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +61,7 @@ pub(super) struct Leaves<'a> {
     /// True if a test rejects the model.
     pub(super) is_left: bool,
     pub(super) grown: &'a Fitted,
+    pub(super) floor: Floor,
     /// What a draft has to be better than.
     pub(super) against: Against<'a>,
 }
@@ -67,7 +72,7 @@ pub(super) fn drafted(
     search: &Search<'_>,
     leaves: &Leaves<'_>,
 ) -> Result<Option<Outcome>, DiscoverError> {
-    let Leaves { verdict, is_left, grown, against } = *leaves;
+    let Leaves { verdict, is_left, grown, floor, against } = *leaves;
     let may_be_drafted = is_open(verdict) || (verdict == Verdict::Explained && is_left);
     if !may_be_drafted || search.options.rule != Rule::Protocol {
         return Ok(None);
@@ -87,7 +92,10 @@ pub(super) fn drafted(
         let added = grown.parameters.terms.iter().skip(search.known_terms);
         closed.extend(added.map(|term| term.definition.stage()));
     }
-    let outcome = search.draft(grown, &name, against, &closed)?;
+    let outcome = match search.draft(grown, &name, against, &closed)? {
+        Ok(found) => describing(prepared, grown, found, floor)?,
+        none => none,
+    };
     if verdict != Verdict::Explained {
         return Ok(Some(outcome));
     }
@@ -97,6 +105,24 @@ pub(super) fn drafted(
             && sign_flip_p(&found.unseen_gains, FLIPS, search.options.seed) <= ALPHA
     };
     Ok(outcome.ok().filter(|found| stands(found)).map(Ok))
+}
+
+/// A draft, if it closes the better part of what a model leaves, as folds of the fitted presses tell. They tell nothing of a model with a
+/// random walk.
+fn describing(
+    prepared: &Prepared<'_>,
+    grown: &Fitted,
+    found: Box<Drafted>,
+    floor: Floor,
+) -> Result<Outcome, DiscoverError> {
+    let by_folds = (prepared.by_folds(grown)?, prepared.by_folds(&found.at)?);
+    let (Some((without, _)), Some((with, of_estimates))) = by_folds else { return Ok(Ok(found)) };
+    let closed = prepared.closed_on([&without, &with], Presses::Fitted, of_estimates, floor);
+    let most = |closed: &Closed| closed.share + MOST_ERRORS * closed.standard_error.unwrap_or(f64::INFINITY);
+    Ok(match closed.filter(|closed| most(closed) < BETTER_PART) {
+        Some(Closed { share, .. }) => Err(NoDraft::SmallerPart { sentence: found.draft.sentence, share }),
+        None => Ok(found),
+    })
 }
 
 /// True if a verdict leaves something that a draft may explain.
@@ -148,19 +174,31 @@ pub struct Confirmation {
     pub heldout_rms_after_counts: f64,
 }
 
-/// A new measurement confirms a draft that closes so much of what is left there,
+/// The strength of a fitted draft, and its standard error. A tone has that of its amplitude, whatever its phase.
+fn strength(term: &Term, errors: &[f64]) -> (f64, f64) {
+    let [along, quadrature] = term.strength_of_draft();
+    let Some(of_quadrature) = errors.get(1) else { return (along, errors[0]) };
+    let amplitude = along.hypot(quadrature);
+    (amplitude, (along * errors[0]).hypot(quadrature * of_quadrature) / amplitude)
+}
+
+/// A new measurement confirms a draft that closes so much of what is left there, and refutes one that closes less beyond two standard errors,
 const CONFIRMED_LEAST: f64 = 0.8;
 /// and whose strength there differs from 1 by no more than this, or by no more than so many standard errors.
 const STRENGTH_APART: f64 = 0.3;
 const STRENGTH_SE: f64 = 3.0;
 
 impl Confirmation {
-    /// True if the draft holds.
-    pub fn holds(&self) -> bool {
+    /// Whether the draft holds; `None` if it may close enough or not, by twice the standard error of what it closes.
+    pub fn holds(&self) -> Option<bool> {
         let apart = (self.strength - 1.0).abs();
         let is_as_strong =
             apart <= STRENGTH_APART || self.strength_se.is_some_and(|error| apart <= STRENGTH_SE * error);
-        self.closed.is_some_and(|closed| closed.share >= CONFIRMED_LEAST) && is_as_strong
+        let Some(Closed { share, standard_error, .. }) = self.closed.filter(|_| is_as_strong) else {
+            return Some(false);
+        };
+        let may_be = share + MOST_ERRORS * standard_error.unwrap_or(0.0);
+        (share >= CONFIRMED_LEAST || may_be < CONFIRMED_LEAST).then_some(share >= CONFIRMED_LEAST)
     }
 }
 
@@ -170,12 +208,11 @@ pub(crate) fn confirmation(
     draft: &'static Definition,
 ) -> Result<Confirmation, DiscoverError> {
     let base = &prepared.base.parameters;
-    let with = Term { values: vec![1.0], ..Term::neutral(draft) };
-    let fitted = prepared.problem().fit_from(base.with(with), POLISH_ROUNDS)?;
+    let fitted = prepared.problem().fit_from(base.with(Term::of_draft(draft)), POLISH_ROUNDS)?;
     let (before, after) = (prepared.residual(base)?, prepared.residual(&fitted.parameters)?);
     let floor = prepared.floor_of(&after);
     let last = fitted.parameters.terms.last().zip(fitted.errors.last());
-    let (strength, error) = last.map_or((0.0, f64::NAN), |(term, errors)| (term.values[0], errors[0]));
+    let (strength, error) = last.map_or((0.0, f64::NAN), |(term, errors)| strength(term, errors));
     Ok(Confirmation {
         strength,
         strength_se: Some(error).filter(|error| error.is_finite()),

@@ -174,8 +174,8 @@ impl Judge<'_> {
             given_up.iter().filter(|one| one.is_refuted()).map(|one| one.effect).collect();
         let against = against.unwrap_or(Against::Classes { refuted: &refuted });
         let verdict = evidence.verdict();
-        let draft =
-            drafted(prepared, search, &Leaves { verdict, is_left: evidence.is_left, grown, against })?;
+        let leaves = Leaves { verdict, is_left: evidence.is_left, grown, floor, against };
+        let draft = drafted(prepared, search, &leaves)?;
         Ok(Judged { confirmed, left, after, of_noise, p_value, residual, floor, verdict, given_up, draft })
     }
 

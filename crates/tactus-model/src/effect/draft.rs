@@ -6,13 +6,14 @@
 //!
 //! `tactus discover` writes one where something is left that no class explains. A [`Draft`] says where in the pipeline it acts and what it
 //! adds to (its [`Carrier`]), on which one or two [`Covariate`]s that depends, and by which [`Law`]. It becomes an effect like any other by
-//! [`Draft::define`], with one parameter:
+//! [`Draft::define`], with these parameters:
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
 //! | `strength` | - | 0 | -10 to 10 | 1 as it was drafted |
+//! | `quadrature` | - | 0 | -10 to 10 | of a tone by time or travel: how much of it there is a quarter of a period ahead; its phase is that of a run |
 //!
-//! Covariates are held within the range that the data had; beyond it the curve keeps its last value.
+//! Covariates are held within the range that the data had; beyond it the curve keeps its last value. A tone goes on.
 //!
 //! | carrier | stage | the curve is |
 //! |---|---|---|
@@ -108,7 +109,8 @@ const LOOK_MM: f64 = 0.3;
 /// Greatest number of values of a table.
 const TABLE_MAX: usize = 1024;
 
-static PARAMETERS: &[Parameter] = &[Parameter::real("strength", 0.0, [-10.0, 10.0])];
+static PARAMETERS: [Parameter; 2] =
+    [Parameter::real("strength", 0.0, [-10.0, 10.0]), Parameter::real("quadrature", 0.0, [-10.0, 10.0])];
 /// The drafts of this process. There are few, and effects refer to their definitions for as long as it runs.
 static DEFINED: Mutex<Vec<&'static Definition>> = Mutex::new(Vec::new());
 
@@ -304,6 +306,31 @@ impl Law {
     }
 }
 
+impl Law {
+    /// So much of it, and of a tone so much of it a quarter of a period ahead.
+    #[must_use]
+    pub fn turned(&self, [strength, quadrature]: [f64; 2]) -> Self {
+        let by = strength;
+        match self.clone() {
+            Self::Linear { offset, slope } => Self::Linear { offset: by * offset, slope: by * slope },
+            Self::Power { scale, exponent } => Self::Power { scale: by * scale, exponent },
+            Self::Exponential { scale, length } => Self::Exponential { scale: by * scale, length },
+            Self::Saturating { scale, length } => Self::Saturating { scale: by * scale, length },
+            Self::Threshold { scale, at } => Self::Threshold { scale: by * scale, at },
+            Self::Periodic { offset, sine, cosine, per_unit } => Self::Periodic {
+                offset: by * offset,
+                sine: by * sine - quadrature * cosine,
+                cosine: by * cosine + quadrature * sine,
+                per_unit,
+            },
+            Self::Logarithm { scale, length } => Self::Logarithm { scale: by * scale, length },
+            Self::Table { at, values } => {
+                Self::Table { at, values: values.into_iter().map(|value| by * value).collect() }
+            }
+        }
+    }
+}
+
 impl Draft {
     /// Where in the pipeline it acts.
     pub fn stage(&self) -> PipelineStage {
@@ -324,7 +351,7 @@ impl Draft {
         let definition: &'static Definition = Box::leak(Box::new(Definition {
             name: &draft.name,
             summary: &draft.sentence,
-            parameters: PARAMETERS,
+            parameters: if draft.phase_is_of_a_run() { &PARAMETERS } else { &PARAMETERS[..1] },
             near_twins: &[],
             shown_by: &[],
             curve: None,
@@ -383,15 +410,26 @@ impl Draft {
         })
     }
 
-    /// The curve times the weight of an element; 0 where it does not act.
-    fn value(&self, seen: Seen<'_>, element: usize) -> f64 {
+    /// True of a tone by what begins with each run, so that its phase in one says nothing of that in another.
+    fn phase_is_of_a_run(&self) -> bool {
+        matches!(self.law, Law::Periodic { .. })
+            && matches!(self.covariates[..], [Covariate::Time | Covariate::Travel])
+    }
+
+    /// The curve at this strength, times the weight of an element; 0 where it does not act.
+    fn value(&self, [strength, quadrature]: [f64; 2], seen: Seen<'_>, element: usize) -> f64 {
         let mut at = [0.0; 2];
         for ((at, covariate), [least, most]) in at.iter_mut().zip(&self.covariates).zip(&self.ranges) {
             let Some(value) = covariate.value(seen, element) else { return 0.0 };
-            *at = value.clamp(*least, *most);
+            let goes_on = matches!(self.law, Law::Periodic { .. });
+            *at = if goes_on { value } else { value.clamp(*least, *most) };
         }
         let weight = self.weights.as_ref().map_or(1.0, |weights| weights[element]);
-        weight * self.law.value(&at[..self.covariates.len()])
+        let mut value = strength * self.law.value(&at[..self.covariates.len()]);
+        if quadrature != 0.0 {
+            value += quadrature * self.law.turned([0.0, 1.0]).value(&at[..1]);
+        }
+        weight * value
     }
 
     /// True if every element sees the same.
@@ -404,7 +442,8 @@ impl Draft {
 #[derive(Debug)]
 pub(crate) struct Drafted {
     draft: &'static Draft,
-    strength: f64,
+    /// Its strength, and of a tone its quadrature.
+    strength: [f64; 2],
     trace: Trace,
     values: Vec<f64>,
     /// The image of the press that a carrier takes, and the place and width of what it is of.
@@ -416,7 +455,7 @@ impl Drafted {
     pub(crate) fn of(draft: &'static Draft, values: &Values) -> Self {
         Self {
             draft,
-            strength: values[0],
+            strength: [values[0], if draft.phase_is_of_a_run() { values[1] } else { 0.0 }],
             trace: Trace::default(),
             values: Vec::new(),
             image_mm: Vec::new(),
@@ -424,11 +463,15 @@ impl Drafted {
         }
     }
 
+    fn is_neutral(&self) -> bool {
+        self.strength.iter().all(|part| *part == 0.0)
+    }
+
     /// Takes the moment. True if the draft acts in it; then `values` has what it adds to the carrier of each element.
     fn acts(&mut self, now: Now<'_>, contact: Option<&Contact>, signal_mm: &[f64], counts: &[f64]) -> bool {
         let Some(contact) = contact else { return false };
         self.trace.take(now.t_s, contact.position_mm, contact.depth_mm, now.temperature_c);
-        if self.strength == 0.0 || !self.draft.when.is_now(&self.trace) {
+        if self.is_neutral() || !self.draft.when.is_now(&self.trace) {
             return false;
         }
         let array = now.base.model.array();
@@ -436,9 +479,9 @@ impl Drafted {
         let (draft, strength) = (self.draft, self.strength);
         self.values.clear();
         if draft.is_common() {
-            self.values.resize(array.elements(), strength * draft.value(seen, 0));
+            self.values.resize(array.elements(), draft.value(strength, seen, 0));
         } else {
-            self.values.extend((0..array.elements()).map(|element| strength * draft.value(seen, element)));
+            self.values.extend((0..array.elements()).map(|element| draft.value(strength, seen, element)));
         }
         true
     }
@@ -463,11 +506,11 @@ impl OnMotion for Drafted {
         let [_, _, z_mm] = tip.tip_mm;
         let depth_mm = tip.surface_mm - z_mm;
         self.trace.take(now.t_s, tip.position_mm(), depth_mm, now.temperature_c);
-        if self.strength == 0.0 || !self.draft.when.is_now(&self.trace) {
+        if self.is_neutral() || !self.draft.when.is_now(&self.trace) {
             return;
         }
         let seen = Seen { trace: &self.trace, array: now.base.model.array(), signal_mm: &[], counts: &[] };
-        let by_mm = self.strength * self.draft.value(seen, 0);
+        let by_mm = self.draft.value(self.strength, seen, 0);
         if self.draft.carrier == Carrier::X {
             shift(tip, [by_mm, 0.0]);
         } else if self.draft.carrier == Carrier::Y {

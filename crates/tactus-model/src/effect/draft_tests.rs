@@ -92,6 +92,36 @@ fn what_stays_at_the_last_place_fades_with_the_time_since_release() {
     assert!((got[3][21] - 100.0 * (-1.0_f64).exp()).abs() < 1e-6, "{}", got[3][21]);
 }
 
+/// A tone has the phase of its run: so much of it, and so much of what it is a quarter of a period ahead, make any other.
+#[test]
+fn a_tone_goes_on_beyond_its_range_with_any_phase() {
+    let law = Law::Periodic { offset: 0.0, sine: 3.0, cosine: 4.0, per_unit: 0.3 };
+    let tone = Draft { ranges: vec![[0.0, 2.0]], ..draft(Carrier::Counts, Covariate::Time, law) };
+    let definition = tone.define().unwrap();
+    let depths_mm = [0.3; 12];
+    let base = counts(Vec::new(), 21, &depths_mm);
+    for [strength, quadrature] in [[1.0, 0.0], [0.0, 1.0], [0.6, -0.8]] {
+        let values = [("strength", strength), ("quadrature", quadrature)];
+        let got = counts(vec![Effect::of(definition, values).unwrap()], 21, &depths_mm);
+        for (second, (got, base)) in got.iter().zip(&base).enumerate() {
+            let tone = |ahead: f64| {
+                let turn = std::f64::consts::TAU * (0.3 * second as f64 + ahead);
+                3.0 * turn.sin() + 4.0 * turn.cos()
+            };
+            let want = strength * tone(0.0) + quadrature * tone(0.25);
+            assert!((got[21] - base[21] - want).abs() < 1e-9, "{second}: {} {want}", got[21] - base[21]);
+        }
+    }
+}
+
+#[test]
+fn a_tone_by_place_has_its_phase() {
+    let law = Law::Periodic { offset: 0.0, sine: 0.1, cosine: 0.2, per_unit: 3.0 };
+    let [by_time, by_place] = [Covariate::Time, Covariate::PlaceX]
+        .map(|of| draft(Carrier::Depth, of, law.clone()).define().unwrap());
+    assert_eq!((by_time.parameters.len(), by_place.parameters.len()), (2, 1));
+}
+
 #[test]
 fn a_table_of_two_covariates_is_straight_between_its_places() {
     let law = Law::Table { at: vec![vec![0.0, 1.0], vec![0.0, 2.0]], values: vec![0.0, 2.0, 4.0, 6.0] };

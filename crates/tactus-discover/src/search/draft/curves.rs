@@ -202,24 +202,6 @@ fn fitted(places: &[f64], curve: &Curve, kind: Kind, shape: f64) -> Option<Price
     Some((cost + 2.0, kind(scale, shape), DMatrix::from_columns(&[column])))
 }
 
-/// A law times a factor.
-pub(super) fn scaled(law: &Law, by: f64) -> Law {
-    match law.clone() {
-        Law::Linear { offset, slope } => Law::Linear { offset: by * offset, slope: by * slope },
-        Law::Power { scale, exponent } => Law::Power { scale: by * scale, exponent },
-        Law::Exponential { scale, length } => Law::Exponential { scale: by * scale, length },
-        Law::Saturating { scale, length } => Law::Saturating { scale: by * scale, length },
-        Law::Threshold { scale, at } => Law::Threshold { scale: by * scale, at },
-        Law::Periodic { offset, sine, cosine, per_unit } => {
-            Law::Periodic { offset: by * offset, sine: by * sine, cosine: by * cosine, per_unit }
-        }
-        Law::Logarithm { scale, length } => Law::Logarithm { scale: by * scale, length },
-        Law::Table { at, values } => {
-            Law::Table { at, values: values.into_iter().map(|value| by * value).collect() }
-        }
-    }
-}
-
 #[cfg(test)]
 #[path = "curves_tests.rs"]
 mod tests;

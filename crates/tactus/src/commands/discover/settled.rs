@@ -100,7 +100,11 @@ fn measured_anew(
         Err(DiscoverError::TooLittle(why)) => return Ok(Err(why.to_string())),
         Err(error) => return Err(error.into()),
     };
-    let status = if told.holds() { DraftStatus::Confirmed } else { DraftStatus::Refuted };
+    let status = match told.holds() {
+        Some(true) => DraftStatus::Confirmed,
+        Some(false) => DraftStatus::Refuted,
+        None => return Ok(Err(format!("{}, which may be enough or not", closes(&told)))),
+    };
     let confirmation = DraftConfirmation {
         data: new.data.iter().map(|source| (source.id.clone(), source.sha256.clone())).collect(),
         strength: told.strength,
@@ -145,15 +149,19 @@ pub(super) fn renumber(
 }
 
 fn in_words(name: &str, status: DraftStatus, told: &Confirmation) -> String {
-    let Confirmation { strength, strength_se, closed: of_left, .. } = told;
+    let Confirmation { strength, strength_se, .. } = told;
     let error = strength_se.map_or_else(String::new, |error| format!(" +- {error:.3}"));
-    let closes = of_left.map_or_else(
+    format!(
+        "{name} is {}: in the new run its strength is {strength:.3}{error} of the drafted one, and {}.",
+        status.name(),
+        closes(told)
+    )
+}
+
+fn closes(told: &Confirmation) -> String {
+    told.closed.map_or_else(
         || "nothing is left there without it".to_owned(),
         |of_left| format!("it closes {} of what is left there without it", closed(of_left)),
-    );
-    format!(
-        "{name} is {}: in the new run its strength is {strength:.3}{error} of the drafted one, and {closes}.",
-        status.name()
     )
 }
 
