@@ -351,6 +351,7 @@ discovery-evidence: bench-discovery
     target/dist/tactus-bench evidence curves --seeds sealed
     target/dist/tactus-bench evidence score --seeds sealed --ablation target/evidence/sealed/work --costs target/evidence/costs.json \
         --document docs/discovery-evidence.md --images docs/images
+    target/dist/tactus-bench evidence confirm --seeds sealed --document docs/discovery-evidence.md
 
 # Twins that one active round on the embedded rig decides or does not, some ten minutes: docs/discovery-evidence.md.
 discovery-active:
@@ -358,7 +359,7 @@ discovery-active:
     target/dist/tactus-bench evidence active --document docs/discovery-evidence.md
 
 # What new data of the same sensors say of the drafts of 40 tuning sets, and how near the drafts' curves come, some ten minutes on two cores. The
-# results are in a folder for each build, so a rerun goes on where it ended: docs/discovery-evidence.md.
+# results are in a folder for each build, so a rerun goes on where it ended.
 discovery-confirm:
     #!/usr/bin/env bash
     set -euo pipefail
@@ -371,7 +372,7 @@ discovery-confirm:
     evidence curves
     evidence score > /dev/null
     grep -A 40 '^## Drafts' "$at/work/evidence.md"
-    evidence confirm --document docs/discovery-evidence.md
+    evidence confirm
 
 # One table for work on the method, of 54 tuning sets, with the programs of `just build`; misses are in target/evidence/quick/work/misses.txt.
 discovery-quick: build

@@ -5,7 +5,7 @@ use std::fmt;
 use std::fs::{self, File};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
@@ -168,7 +168,9 @@ impl Confirmations<'_> {
         let mut confirm = Command::new(self.tactus);
         confirm.args(["--json", "effects", "--library"]).arg(&library).args(["confirm", &name]).arg(&table);
         confirm.arg("--model").arg(&model).env("RAYON_NUM_THREADS", "1");
-        confirm.stdout(Stdio::null()).stderr(File::create(&log).with_context(|| at(&log))?);
+        // What it refuses it says on the standard output, as JSON.
+        let heard = File::create(&log).with_context(|| at(&log))?;
+        confirm.stdout(heard.try_clone().with_context(|| at(&log))?).stderr(heard);
         // A terminal's Ctrl-C is for the worker alone, which ends the program.
         confirm.process_group(0);
         let Some(watched) = watched(&mut confirm, stop)? else { return Ok(None) };
