@@ -92,19 +92,20 @@ pub(super) fn drafted(
         let added = grown.parameters.terms.iter().skip(search.known_terms);
         closed.extend(added.map(|term| term.definition.stage()));
     }
-    let outcome = match search.draft(grown, &name, against, &closed)? {
-        Ok(found) => describing(prepared, grown, found, floor)?,
-        none => none,
+    let found = match search.draft(grown, &name, against, &closed)? {
+        Ok(found) => found,
+        Err(why) => return Ok((verdict != Verdict::Explained).then_some(Err(why))),
     };
     if verdict != Verdict::Explained {
-        return Ok(Some(outcome));
+        return describing(prepared, grown, found, floor).map(Some);
     }
     // Names explain all that matters. A second covariate may have brought a draft to another stage.
-    let stands = |found: &Drafted| {
-        !closed.contains(&found.draft.stage())
-            && sign_flip_p(&found.unseen_gains, FLIPS, search.options.seed) <= ALPHA
-    };
-    Ok(outcome.ok().filter(|found| stands(found)).map(Ok))
+    let stands = !closed.contains(&found.draft.stage())
+        && sign_flip_p(&found.unseen_gains, FLIPS, search.options.seed) <= ALPHA;
+    if !stands {
+        return Ok(None);
+    }
+    Ok(describing(prepared, grown, found, floor)?.ok().map(Ok))
 }
 
 /// A draft, if it closes the better part of what a model leaves, as folds of the fitted presses tell. They tell nothing of a model with a

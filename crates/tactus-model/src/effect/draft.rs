@@ -304,13 +304,10 @@ impl Law {
             },
         }
     }
-}
 
-impl Law {
     /// So much of it, and of a tone so much of it a quarter of a period ahead.
     #[must_use]
-    pub fn turned(&self, [strength, quadrature]: [f64; 2]) -> Self {
-        let by = strength;
+    pub fn turned(&self, [by, quadrature]: [f64; 2]) -> Self {
         match self.clone() {
             Self::Linear { offset, slope } => Self::Linear { offset: by * offset, slope: by * slope },
             Self::Power { scale, exponent } => Self::Power { scale: by * scale, exponent },
