@@ -1,15 +1,17 @@
 //! Writes into each label how far its physics is from the nearest wrong effect.
 
 use anyhow::{Context, Result};
-use tactus_sets::Label;
+use tactus_sets::{Label, PhysicsLabel};
 use tactus_work::{Now, Stop, Work, Worked, Worker, work, write_whole};
 
 use super::campaign::Planned;
 use super::outcome::parsed;
 use super::run::Places;
+use super::score::Z_NAMEABLE;
 
-/// Fits the library's effects to the physics of each set that has a label, and keeps the fits there, for the scorer only. Labels that
-/// have them are kept as they are. Workers that have the same folders share the sets.
+/// Fits the library's effects to the physics of each set that has a label, until a wrong one is nearer than [`Z_NAMEABLE`], and keeps the
+/// fits there, for the scorer only. Points of the library's own parameters are in no score and get none. Labels that have fits are kept
+/// as they are. Workers that have the same folders share the sets.
 ///
 /// # Errors
 /// If a label cannot be read or written.
@@ -46,14 +48,16 @@ impl Work for Separations<'_> {
 
     fn is_done(&self, set: &Planned) -> Result<bool> {
         let label = self.label(set)?;
-        Ok(label.is_none_or(|label| label.physics.iter().all(|dosed| !dosed.z_of_effects.is_empty())))
+        Ok(label.is_none_or(|label| !label.physics.iter().any(lacks_fits)))
     }
 
     fn make(&self, set: &Planned, stop: &Stop) -> Result<Option<Label>> {
         let mut label = self.label(set)?.with_context(|| format!("{} had a label", set.id))?;
-        for dosed in label.physics.iter_mut().filter(|dosed| dosed.z_of_effects.is_empty()) {
+        for dosed in label.physics.iter_mut().filter(|dosed| lacks_fits(dosed)) {
             let (recipe, physics) = (set.recipe.clone(), dosed.clone());
-            let Some(fits) = stop.unless_set(move || recipe.class_fits(&physics)) else { return Ok(None) };
+            let Some(fits) = stop.unless_set(move || recipe.class_fits(&physics, Z_NAMEABLE)) else {
+                return Ok(None);
+            };
             dosed.z_of_effects = fits.with_context(|| set.id.clone())?.effects;
         }
         Ok(Some(label))
@@ -64,6 +68,10 @@ impl Work for Separations<'_> {
         let text = serde_json::to_vec_pretty(&label).with_context(|| set.id.clone())?;
         write_whole(&path, &text).with_context(|| path.display().to_string())
     }
+}
+
+fn lacks_fits(dosed: &PhysicsLabel) -> bool {
+    !dosed.is_library_point && dosed.z_of_effects.is_empty()
 }
 
 #[cfg(test)]

@@ -2,18 +2,21 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::time::Duration;
 
-use tactus_sets::{Content, Recipe};
+use tactus_model::effect::REGISTRY;
+use tactus_sets::{Amount, ClassFits, Content, Recipe};
 use tactus_work::Claims;
 
 use super::super::campaign::Campaign;
 use super::*;
 
-#[test]
-fn a_label_gets_its_separation_once() -> Result<()> {
-    let folder = std::env::temp_dir().join(format!("tactus-separate-{}", std::process::id()));
+/// The label of a set with one physics at a strength, separated twice, and how many labels the two rounds made.
+fn separated(physics: &str, strength: f64) -> Result<(Label, [usize; 2])> {
+    let folder =
+        std::env::temp_dir().join(format!("tactus-separate-{physics}-{strength}-{}", std::process::id()));
     let places = Places { work: folder.join("work"), labels: folder.join("labels") };
-    let content = Content { physics: vec!["late-touch".into()], ..Content::default() };
-    let recipe = Recipe { frames: Some(400), content, ..Recipe::new(3) };
+    let content = Content { physics: vec![physics.into()], ..Content::default() };
+    let amount = Amount::Strength(strength);
+    let recipe = Recipe { frames: Some(400), content, amount, ..Recipe::new(3) };
     let set = Planned { id: "names/one".into(), campaign: Campaign::Names, recipe };
     let path = places.label(&set.id);
     fs::create_dir_all(path.parent().context("a folder")?)?;
@@ -23,14 +26,47 @@ fn a_label_gets_its_separation_once() -> Result<()> {
         threads: NonZeroUsize::MIN,
         stop: Stop::default(),
     };
-    let separated = || separate(std::slice::from_ref(&set), &places, &worker, &|_, _| ());
-    let done = [separated()?.done, separated()?.done];
+    let round = || separate(std::slice::from_ref(&set), &places, &worker, &|_, _| ());
+    let done = [round()?.done, round()?.done];
     let label: Label = parsed(&path)?;
     fs::remove_dir_all(&folder)?;
-    let fits = label.physics[0].class_fits().context("it has them")?;
+    Ok((label, done))
+}
+
+fn fits(label: &Label) -> Result<ClassFits> {
+    label.physics[0].class_fits().context("it has them")
+}
+
+#[test]
+fn a_label_gets_its_separation_once() -> Result<()> {
+    let (label, done) = separated("late-frames-clock", 1.0)?;
     assert_eq!(done, [1, 0]);
-    assert_eq!(fits.effects.len(), tactus_model::effect::REGISTRY.len());
-    let nearest = fits.z_name(Some("surface-offset")).context("it is an effect")?;
+    let fits = fits(&label)?;
+    let nearest = fits.z_name(Some("time-lag")).context("it is an effect")?;
     assert!(nearest > 0.0 && nearest <= 1.001 * fits.base, "{nearest} of {}", fits.base);
+    Ok(())
+}
+
+#[test]
+fn the_fits_end_where_a_wrong_effect_is_near() -> Result<()> {
+    let (label, _) = separated("toe", 1e-3)?;
+    let fits = fits(&label)?;
+    assert!(fits.base < Z_NAMEABLE, "{}", fits.base);
+    assert_eq!(fits.effects.keys().collect::<Vec<_>>(), ["surface-offset"]);
+    Ok(())
+}
+
+#[test]
+fn a_far_physics_has_fits_of_all_effects() -> Result<()> {
+    let (label, _) = separated("grounding", 1.0)?;
+    assert_eq!(fits(&label)?.effects.len(), REGISTRY.len());
+    Ok(())
+}
+
+#[test]
+fn a_point_of_the_librarys_own_parameters_gets_no_fits() -> Result<()> {
+    let (label, done) = separated("late-touch", 1.0)?;
+    assert_eq!(done, [0, 0]);
+    assert_eq!(label.physics[0].class_fits(), None);
     Ok(())
 }

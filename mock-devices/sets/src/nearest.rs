@@ -11,7 +11,7 @@ use tactus_model::{Effect, Images};
 use crate::oracle::SeparationOracle;
 use crate::separation::Separation;
 
-/// How far each effect of the library, fitted to the counts, stays from them.
+/// How far effects of the library, fitted to the counts, stay from them.
 ///
 /// Each is `z_c = sqrt(chi2)` of what the best fit leaves, as [`Separation::z_beyond_spread`]: gains, offsets and spread are
 /// fitted too. It is an upper bound, since a search from a few starts may miss the best fit.
@@ -24,9 +24,9 @@ pub struct ClassFits {
 }
 
 impl ClassFits {
-    /// `min over wrong c of sqrt(max(0, z_c^2 - z_true^2))`: how far the nearest wrong effect fits worse than the true one. Of physics
-    /// outside the library (`None`) every effect is wrong, and the truth leaves nothing. An effect that is neutral leaves what the base
-    /// model leaves, and none fits worse.
+    /// `min over wrong c of sqrt(max(0, z_c^2 - z_true^2))`: how far the nearest wrong effect fits worse than the true one, of those that
+    /// are fitted. Of physics outside the library (`None`) every effect is wrong, and the truth leaves nothing. An effect that is neutral
+    /// leaves what the base model leaves, and none fits worse.
     pub fn z_name(&self, effect: Option<&str>) -> Option<f64> {
         let right = effect.map_or(Some(0.0), |effect| self.effects.get(effect).copied())?.min(self.base);
         let wrong = self.effects.iter().filter(|(name, _)| Some(name.as_str()) != effect).map(|(_, z)| *z);
@@ -74,23 +74,33 @@ impl<'a> Fitter<'a> {
         Self { oracle, with, images, plain: oracle.clean.clone() }
     }
 
-    /// The fits of all effects; in full those of `effect` and of the nearest others.
-    pub(crate) fn all(&self, effect: Option<&str>) -> ClassFits {
-        let mut guesses: Vec<Guess> = REGISTRY.iter().map(|definition| self.first(definition)).collect();
+    /// The fits of effects, in full those of the right one, if there is one, and of the nearest others. They end with a wrong one whose
+    /// [`ClassFits::z_name`] is below `enough`: a nearer one would tell nothing more.
+    pub(crate) fn until(&self, right: Option<&'static Definition>, enough: f64) -> ClassFits {
+        let name = right.map(|right| right.name);
+        let base = ClassFits { base: self.base_z(), effects: BTreeMap::new() };
+        let mut fits = right.map_or(base, |right| self.one(right));
+        let is_enough = |fits: &ClassFits| fits.z_name(name).is_some_and(|z| z < enough);
+        let is_twin = |other: &&Definition| right.is_some_and(|right| right.near_twins.contains(&other.name));
+        let (twins, strangers): (Vec<&'static Definition>, Vec<_>) =
+            REGISTRY.iter().copied().partition(is_twin);
+        let mut guesses = Vec::new();
+        for other in twins.into_iter().chain(strangers).filter(|other| Some(other.name) != name) {
+            if !fits.effects.is_empty() && is_enough(&fits) {
+                return fits;
+            }
+            let guess = self.first(other);
+            fits.effects.insert(other.name.to_owned(), guess.z);
+            guesses.push(guess);
+        }
         guesses.sort_by(|one, other| one.z.total_cmp(&other.z));
-        let is_right = |guess: &Guess| Some(guess.definition.name) == effect;
-        let nearest: Vec<&str> = guesses
-            .iter()
-            .filter(|guess| !is_right(guess))
-            .take(NEAREST)
-            .map(|one| one.definition.name)
-            .collect();
-        let finished = guesses.iter().map(|guess| {
-            let is_near = is_right(guess) || nearest.contains(&guess.definition.name);
-            let z = if is_near { self.polished(guess.clone()).z } else { guess.z };
-            (guess.definition.name.to_owned(), z)
-        });
-        ClassFits { base: self.base_z(), effects: finished.collect() }
+        for guess in guesses.into_iter().take(NEAREST) {
+            if is_enough(&fits) {
+                break;
+            }
+            fits.effects.insert(guess.definition.name.to_owned(), self.polished(guess).z);
+        }
+        fits
     }
 
     /// The fit of one effect.

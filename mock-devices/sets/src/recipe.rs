@@ -6,7 +6,7 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tactus_hidden::{CATALOGUE, Climate, Definition, Dose, RandomRig};
-use tactus_model::effect::{EffectError, REGISTRY};
+use tactus_model::effect::{self, EffectError, REGISTRY};
 use tactus_model::{ModelError, TrajectoryError};
 use tactus_schema::Rig;
 use tactus_schema::table::Row;
@@ -181,21 +181,22 @@ impl Recipe {
         DataSet { rig: base.rig.clone(), rows, label }
     }
 
-    /// The fits of all effects of the library to one physics of this set's label, alone and without noise.
+    /// The fits of effects of the library to one physics of this set's label, alone and without noise. They end with a wrong one whose
+    /// [`ClassFits::z_name`] is below `enough`.
     ///
     /// # Errors
     /// As [`Recipe::make`].
-    pub fn class_fits(&self, of: &PhysicsLabel) -> Result<ClassFits, RecipeError> {
-        self.fitted(of, |fitter| fitter.all(of.effect.as_deref()))
+    pub fn class_fits(&self, of: &PhysicsLabel, enough: f64) -> Result<ClassFits, RecipeError> {
+        let right = of.effect.as_deref().map(known).transpose()?;
+        self.fitted(of, |fitter| fitter.until(right, enough))
     }
 
-    /// The same of one effect alone.
+    /// The fit of one effect alone.
     ///
     /// # Errors
     /// As [`Recipe::make`].
     pub fn class_fit(&self, of: &PhysicsLabel, effect: &str) -> Result<ClassFits, RecipeError> {
-        let found = REGISTRY.iter().find(|known| known.name == effect);
-        let definition = found.ok_or_else(|| RecipeError::UnknownEffect(effect.into()))?;
+        let definition = known(effect)?;
         self.fitted(of, |fitter| fitter.one(definition))
     }
 
@@ -383,6 +384,12 @@ struct Readings {
     rows: Vec<Row>,
     /// The counts of all rows without noise and quantisation.
     clean: Vec<f64>,
+}
+
+/// An effect of the library.
+fn known(effect: &str) -> Result<&'static effect::Definition, RecipeError> {
+    let found = REGISTRY.iter().copied().find(|known| known.name == effect);
+    found.ok_or_else(|| RecipeError::UnknownEffect(effect.into()))
 }
 
 /// A random physics among those that fulfil a condition.
