@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use prost::Message as _;
 use rustix::process::{Pid, Signal, kill_process};
-use tactus_bus::{Client, Endpoint, Hold};
+use tactus_bus::{BusError, Client, Endpoint, HeldLease, Hold};
 use tactus_record::{Entry, Message};
 use tactus_runner::config::RigFiles;
 use tactus_runner::embedded::{Truth, simulated_rig};
@@ -369,10 +369,7 @@ async fn start_runs(endpoint: &Endpoint, names: &[String], script: &str) -> Resu
 /// Resets a rig and starts a run on it.
 async fn start_run(endpoint: &Endpoint, rig: &str, script: &str) -> Result<()> {
     let client = Client::connect(endpoint, Some(rig)).await?;
-    let held = match client.hold("bench", None).await? {
-        Hold::Held(held) => held,
-        Hold::Refused(reply) => bail!(reply.error),
-    };
+    let held = timeout(PATIENCE, held(&client)).await??;
     let (who, lease) = ("bench".to_owned(), held.secret());
     let request = pb::CommandRequest { who: who.clone(), lease: lease.clone(), ..Default::default() };
     let reply = client.command(Command::Reset, &request, PATIENCE).await?;
@@ -389,6 +386,18 @@ async fn start_run(endpoint: &Endpoint, rig: &str, script: &str) -> Result<()> {
     held.release().await?;
     client.close().await?;
     Ok(())
+}
+
+/// The lease of a rig. A service that starts hundreds of runs may answer late: then it is asked again.
+async fn held(client: &Client) -> Result<HeldLease> {
+    loop {
+        match client.hold("bench", None).await {
+            Ok(Hold::Held(held)) => return Ok(held),
+            Ok(Hold::Refused(reply)) => bail!(reply.error),
+            Err(BusError::NoAnswer { .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
 }
 
 /// Counts a frame that reached the subscriber.

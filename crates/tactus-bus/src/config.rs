@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tactus_schema::key::Keys;
 use zenoh::Config;
 
-use crate::{BusError, Endpoint, access, error::of_zenoh, topic::FRAMES_KEPT_MAX};
+use crate::{BusError, Endpoint, access, error::of_zenoh, outlet::waits_for_room, topic::FRAMES_KEPT_MAX};
 
 /// Longest message that a service takes, in bytes. Zenoh collects a message of many parts in memory up to this size.
 const SERVICE_MESSAGE_BYTES_MAX: usize = 2 << 20;
@@ -141,6 +141,13 @@ impl BusConfig {
             // default is 5 s.
             ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(100_000)),
         ];
+        if !waits_for_room(rigs.len()) {
+            // Zenoh's default is 1 ms, and 50 ms more for a message of many parts.
+            settings.extend([
+                ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", json!(0)),
+                ("transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments", json!(0)),
+            ]);
+        }
         if let Some(tls) = &self.tls {
             settings.extend([
                 ("transport/link/tls/root_ca_certificate", json!(tls.authority)),

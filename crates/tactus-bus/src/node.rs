@@ -41,6 +41,8 @@ pub struct Node {
     pub(crate) history_queries: Arc<Queue<HistoryQuery>>,
     pub(crate) stops: mpsc::Sender<Box<CommandCall>>,
     pub(crate) served: Served,
+    /// How many rigs it may serve.
+    pub(crate) rigs: usize,
     /// Frames that are kept of each rig.
     pub(crate) frames_kept: usize,
     command_replies: Worker<PendingReplies>,
@@ -96,6 +98,7 @@ impl Node {
             history_queries,
             stops,
             served,
+            rigs: rigs.len(),
             frames_kept: frames_kept(config.frames_kept, rigs.len()),
             command_replies,
             history_replies,

@@ -5,11 +5,14 @@
 //!
 //! Where many rigs call, the thread lets calls gather for a millisecond: it is woken once for all of them, and zenoh sends their
 //! messages in one packet.
+//!
+//! A service of one rig or two sends its frames from the task that has them, which spares the wake of a thread on each frame's way. That
+//! is as quick for the task as a call of the thread, because such a service lets zenoh drop a message for a full link at once.
 
 use std::{
     io,
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
     thread::{self, JoinHandle},
@@ -30,6 +33,11 @@ const WAITING_BYTES_MAX: usize = 16 << 20;
 const AT_ONCE: usize = 64;
 /// Rigs that call at a time from which on calls gather.
 const MANY: usize = 3;
+/// True if zenoh waits a moment for room in a full link of a client before it drops a message, in a service of so many rigs.
+pub(crate) const fn waits_for_room(rigs: usize) -> bool {
+    rigs >= MANY
+}
+
 /// Time in which calls gather.
 const GATHERING: Duration = Duration::from_millis(1);
 
@@ -44,8 +52,10 @@ pub(crate) struct Outlets {
 #[derive(Debug)]
 pub(crate) struct Outlet {
     queue: Queue<Outgoing>,
-    /// The thread's alone; `None` once all is sent, so that nothing of zenoh outlives the session.
+    /// Of who sends; `None` once all is sent, so that nothing of zenoh outlives the session.
     publishers: Mutex<Option<TopicPublishers>>,
+    /// Who has a message sends it, unless another is sending.
+    is_direct: bool,
     /// The thread has been called and has not come yet.
     is_called: AtomicBool,
     caller: Caller,
@@ -82,7 +92,8 @@ impl Outlets {
 }
 
 impl Outlet {
-    pub(crate) fn new(lane: Lane, publishers: TopicPublishers, caller: Caller) -> Arc<Self> {
+    /// That of one of so many rigs.
+    pub(crate) fn new(lane: Lane, publishers: TopicPublishers, caller: Caller, rigs: usize) -> Arc<Self> {
         // Drop-oldest, counted.
         let capacity = match lane {
             // 10 s.
@@ -93,13 +104,21 @@ impl Outlet {
         let queue = Queue::bounded(capacity, WAITING_BYTES_MAX, |message: &Outgoing| message.payload.len());
         let publishers = Mutex::new(Some(publishers));
         let (is_called, finished) = (AtomicBool::new(false), Notify::new());
-        Arc::new(Self { queue, publishers, is_called, caller, finished })
+        let is_direct = lane == Lane::Frames && !waits_for_room(rigs);
+        Arc::new(Self { queue, publishers, is_direct, is_called, caller, finished })
     }
 
     /// Appends a message; returns the one that gave way to it, if the queue is full.
     pub(crate) fn push(self: &Arc<Self>, message: Outgoing) -> Option<Outgoing> {
         let displaced = self.queue.push(message);
-        self.call();
+        if self.is_direct
+            && let Ok(publishers) = self.publishers.try_lock()
+        {
+            self.send_as(publishers);
+        } else {
+            // Whoever sends now may have seen the queue without this message.
+            self.call();
+        }
         displaced
     }
 
@@ -125,7 +144,10 @@ impl Outlet {
     fn send(self: &Arc<Self>) {
         // Before the queue is looked at: a message that comes later calls again.
         self.is_called.store(false, Ordering::Release);
-        let mut publishers = self.publishers.lock().unwrap_or_else(PoisonError::into_inner);
+        self.send_as(self.publishers.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    fn send_as(self: &Arc<Self>, mut publishers: MutexGuard<'_, Option<TopicPublishers>>) {
         for _ in 0..AT_ONCE {
             let Some(message) = self.queue.try_pop() else {
                 if self.queue.is_finished() {

@@ -74,8 +74,8 @@ impl Bus {
             TopicPublishers::declare(session, &keys, lane, node.frames_kept, &node.history_queries).await
         };
         let outlets = Outlets {
-            frames: Outlet::new(Lane::Frames, of_lane(Lane::Frames).await?, frames.caller()),
-            updates: Outlet::new(Lane::Updates, of_lane(Lane::Updates).await?, updates.caller()),
+            frames: Outlet::new(Lane::Frames, of_lane(Lane::Frames).await?, frames.caller(), node.rigs),
+            updates: Outlet::new(Lane::Updates, of_lane(Lane::Updates).await?, updates.caller(), node.rigs),
         };
         let bus = Self { outlets: Arc::new(outlets), node, keys, _commands: queryable, _instance: instance };
         Ok((bus, commands))

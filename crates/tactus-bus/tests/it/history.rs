@@ -119,3 +119,25 @@ async fn what_is_published_just_before_closing_still_arrives() {
         assert_eq!(events.recv().await.unwrap().seq, seq);
     }
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_that_several_tasks_send_at_a_time_all_arrive() {
+    const EACH: u64 = 50;
+    let service = open("bench", &[]).await;
+    let client = Client::connect(&service.endpoint, Some("bench")).await.unwrap();
+    let mut frames = client.subscribe::<pb::Frame>(History::All).await.unwrap();
+    let senders = (0..4).map(|sender| {
+        let publisher = service.bus.publisher();
+        std::thread::spawn(move || {
+            (0..EACH).for_each(|number| publisher.publish_frame(&frame(sender * EACH + number)));
+        })
+    });
+    let senders: Vec<_> = senders.collect();
+    let mut seen = std::collections::BTreeSet::new();
+    while seen.len() < 4 * EACH as usize {
+        seen.insert(frames.recv().await.unwrap().seq);
+    }
+    senders.into_iter().for_each(|sender| sender.join().unwrap());
+    assert_eq!(frames.losses().missed, 0);
+    service.bus.close().await.unwrap();
+}
