@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use prost::Message as _;
 use rustix::process::{Pid, Signal, kill_process};
-use tactus_bus::{BusError, Client, Endpoint, HeldLease, Hold};
+use tactus_bus::{BusError, Client, Credentials, Endpoint, HeldLease, Hold, Lab};
 use tactus_record::{Entry, Message};
 use tactus_runner::config::RigFiles;
 use tactus_runner::embedded::{Truth, simulated_rig};
@@ -41,6 +41,8 @@ use sent::SentTimes;
 const RATE_HZ: f64 = 30.0;
 /// Only a hang takes this long.
 const PATIENCE: Duration = Duration::from_mins(5);
+/// Time until a lease is asked for again.
+const AGAIN: Duration = Duration::from_secs(1);
 /// Runs that are started at the same time: most of it is the homing of the stage.
 const STARTING_MAX: usize = 8;
 /// A run waits for this long for each rig that starts after its own. Its dry run computes every frame of it, and so must not be much longer.
@@ -351,13 +353,14 @@ async fn all_ready(names: &[String], service: &mut Service) -> Result<()> {
 
 /// Starts a run on each rig.
 async fn start_runs(endpoint: &Endpoint, names: &[String], script: &str) -> Result<()> {
+    let lab = Arc::new(Lab::connect(endpoint, &Credentials::default()).await?);
     let (room, mut starting) = (Arc::new(Semaphore::new(STARTING_MAX)), JoinSet::new());
     for name in names {
-        let (room, endpoint) = (Arc::clone(&room), endpoint.clone());
+        let (room, lab) = (Arc::clone(&room), Arc::clone(&lab));
         let (name, script) = (name.clone(), script.to_owned());
         starting.spawn(async move {
             let _place = room.acquire().await?;
-            start_run(&endpoint, &name, &script).await.with_context(|| format!("rig {name}"))
+            start_run(&lab.client(&name).await?, &script).await.with_context(|| format!("rig {name}"))
         });
     }
     while let Some(started) = starting.join_next().await {
@@ -367,9 +370,8 @@ async fn start_runs(endpoint: &Endpoint, names: &[String], script: &str) -> Resu
 }
 
 /// Resets a rig and starts a run on it.
-async fn start_run(endpoint: &Endpoint, rig: &str, script: &str) -> Result<()> {
-    let client = Client::connect(endpoint, Some(rig)).await?;
-    let held = timeout(PATIENCE, held(&client)).await??;
+async fn start_run(client: &Client, script: &str) -> Result<()> {
+    let held = timeout(PATIENCE, held(client)).await??;
     let (who, lease) = ("bench".to_owned(), held.secret());
     let request = pb::CommandRequest { who: who.clone(), lease: lease.clone(), ..Default::default() };
     let reply = client.command(Command::Reset, &request, PATIENCE).await?;
@@ -384,16 +386,15 @@ async fn start_run(endpoint: &Endpoint, rig: &str, script: &str) -> Result<()> {
     let reply = client.command(Command::Run, &request, PATIENCE).await?;
     ensure!(reply.ok, "{}", reply.error);
     held.release().await?;
-    client.close().await?;
     Ok(())
 }
 
-/// The lease of a rig. A service that starts hundreds of runs may answer late: then it is asked again.
+/// The lease of a rig. A service that starts hundreds of runs may answer late, and then keeps the lease for nobody until it ends.
 async fn held(client: &Client) -> Result<HeldLease> {
     loop {
         match client.hold("bench", None).await {
             Ok(Hold::Held(held)) => return Ok(held),
-            Ok(Hold::Refused(reply)) => bail!(reply.error),
+            Ok(Hold::Refused(_)) => sleep(AGAIN).await,
             Err(BusError::NoAnswer { .. }) => {}
             Err(error) => return Err(error.into()),
         }

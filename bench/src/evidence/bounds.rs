@@ -46,7 +46,7 @@ impl Counts {
             outcomes.iter().filter(|set| set.campaign == campaign && is_so(set)).count()
         };
         let named = outcomes.iter().filter(|set| set.campaign == Campaign::Names);
-        let shrinks: Vec<f64> = named.filter_map(Outcome::shrink_to_own_fit).collect();
+        let shrinks: Vec<f64> = named.filter_map(Outcome::shrink_to_fit_in_report).collect();
         Self {
             false_alarms: count(Campaign::FalseAlarms, |set| set.is_detected() || set.has_failed()),
             exact: count(Campaign::Names, Outcome::is_exact),

@@ -12,7 +12,7 @@ use super::campaign::Campaign;
 use super::drafts::{CurveScore, DraftScore, DraftScores};
 use super::outcome::Outcome;
 use super::rate::Rate;
-use super::score::{APART, Band, ORACLE_LEVEL, OutsideScore, Scores, SetSize, Several, Shrink, Spread};
+use super::score::{Band, ORACLE_LEVEL, OutsideScore, Scores, SetSize, Several, Shrink, Spread};
 use super::timing::Timing;
 
 /// A part of a document that this program replaces, between marks of its own.
@@ -210,18 +210,10 @@ fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
         rows.push(rate("outside the library: not detected", 0.1, true, all.missed));
         rows.push(rate("outside the library: a wrong name", 0.05, true, all.wrong));
     }
-    if let Some(apart) = scores.outside.get(APART) {
-        rows.push(rate("the same, 5 and more from the nearest effect", 0.05, true, apart.wrong));
-    }
-    let drafted = "outside the library: drafted with the right stage and covariate";
-    let apart =
-        "outside the library, 5 and more from the nearest effect: drafted with the right stage and covariate";
-    for (what, group) in [(drafted, "all"), (apart, APART)] {
-        if let Some(drafts) = scores.drafts.outside.get(group) {
-            let closed = "the same, and 70 % closed on held-out presses";
-            rows.push(rate(what, 0.8, false, drafts.right));
-            rows.push(rate(closed, 0.6, false, drafts.right_and_closed));
-        }
+    if let Some(drafts) = scores.drafts.outside.get("all") {
+        let drafted = "outside the library: drafted with the right stage and covariate";
+        rows.push(rate(drafted, 0.8, false, drafts.right));
+        rows.push(rate("the same, and 70 % closed on held-out presses", 0.6, false, drafts.right_and_closed));
     }
     rows.push(rate("drafts of sets without hidden physics", 0.005, true, scores.drafts.of_nothing));
     rows.push(rate("drafts of sets with one effect of the library", 0.05, true, scores.drafts.of_named));

@@ -56,8 +56,8 @@ pub struct Truth {
     pub is_library_point: bool,
     /// Separation from the base model after gains, offsets and spread are fitted.
     pub z: f64,
-    /// Separation from the nearest wrong effect ([`ClassFits::z_name`](tactus_sets::ClassFits::z_name)), if it is computed: of physics
-    /// outside the library from the nearest effect.
+    /// Separation from the nearest wrong effect ([`ClassFits::z_name`](tactus_sets::ClassFits::z_name)), if it is computed; none outside the
+    /// library, where every name is wrong.
     pub z_name: Option<f64>,
     /// Share of the gap that the effect's own best fit closes without noise, if it is computed.
     pub own_shrink: Option<f64>,
@@ -114,10 +114,18 @@ impl Outcome {
         self.named.iter().filter(|named| !is_true(named)).map(|named| named.effect.as_str()).collect()
     }
 
-    /// The shrink, 0 without a report, over that of the first hidden effect, fitted alone: without noise, or else in the report.
+    /// The shrink, 0 without a report, over that of the first hidden effect, fitted alone without noise, if that is computed.
     pub fn shrink_to_own_fit(&self) -> Option<f64> {
-        let own = self.truths.first().and_then(|truth| truth.own_shrink).or(self.alone_shrink);
-        Some(self.known_shrink()? / own.filter(|own| *own > 0.0)?)
+        self.shrink_to(self.truths.first()?.own_shrink)
+    }
+
+    /// The same over that of the fit in the report. Where nothing is seen the report has none, so that misses are not in it.
+    pub fn shrink_to_fit_in_report(&self) -> Option<f64> {
+        self.shrink_to(self.alone_shrink)
+    }
+
+    fn shrink_to(&self, fit: Option<f64>) -> Option<f64> {
+        Some(self.known_shrink()? / fit.filter(|fit| *fit > 0.0)?)
     }
 
     /// The shrink if it is known within a tenth; 0 without a report.
@@ -253,7 +261,7 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryRepo
             effect: dosed.effect.clone(),
             is_library_point: dosed.is_library_point,
             z: dosed.z_beyond_spread,
-            z_name: fits.as_ref().and_then(|fits| fits.z_name(effect)),
+            z_name: fits.as_ref().zip(effect).and_then(|(fits, effect)| fits.z_name(effect)),
             own_shrink: fits.as_ref().zip(effect).and_then(|(fits, effect)| fits.shrink(effect)),
         }
     };

@@ -141,7 +141,8 @@ fn labels_and_reports_are_read_from_files() -> Result<()> {
 fn a_shrink_is_over_that_of_the_own_fit_without_noise() {
     let mut right = set(&[Some("backlash")], &[("backlash", &[])], "explained");
     right.alone_shrink = Some(0.5);
-    assert!(right.shrink_to_own_fit().is_some_and(|shrink| (shrink - 1.8).abs() < 1e-12));
+    assert!(right.shrink_to_fit_in_report().is_some_and(|shrink| (shrink - 1.8).abs() < 1e-12));
+    assert_eq!(right.shrink_to_own_fit(), None);
     right.truths[0].own_shrink = Some(0.9);
     assert!(right.shrink_to_own_fit().is_some_and(|shrink| (shrink - 1.0).abs() < 1e-12));
     assert_eq!(Outcome { verdict: "failed".into(), ..right.clone() }.shrink_to_own_fit(), Some(0.0));

@@ -15,8 +15,6 @@ pub const Z_DETECTABLE: f64 = 4.0;
 pub const Z_SEPARATE: f64 = 16.0;
 /// The separation from the nearest wrong effect from which on a name is asked for.
 pub const Z_NAMEABLE: f64 = 5.0;
-/// The sets that are so far from every wrong effect; those of which that is not computed are not among them.
-pub(super) const APART: &str = "all, 5 and more from the nearest wrong effect";
 /// Level of the oracle's test, equal to the allowed share of false alarms.
 pub const ORACLE_LEVEL: f64 = 0.028;
 /// The `1 - ORACLE_LEVEL` quantile of the normal distribution.
@@ -373,13 +371,12 @@ fn by_noise(sets: &[&Outcome]) -> BTreeMap<String, Rate> {
     groups.into_iter().map(|(kind, sets)| (kind, Rate::of(&sets, is_alarm))).collect()
 }
 
-/// Some sets as `all`, those [`APART`], and by physics.
+/// Some sets as `all` and by physics.
 pub(super) fn by_physics<'a>(sets: &[&'a Outcome]) -> BTreeMap<String, Vec<&'a Outcome>> {
     let mut groups: BTreeMap<String, Vec<&Outcome>> = BTreeMap::new();
     for set in sets {
-        let apart = set.is_apart().then_some(APART);
         let physics = set.truths.iter().map(|truth| truth.physics.as_str());
-        for group in ["all"].into_iter().chain(apart).chain(physics) {
+        for group in ["all"].into_iter().chain(physics) {
             groups.entry(group.into()).or_default().push(set);
         }
     }

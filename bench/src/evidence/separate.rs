@@ -10,8 +10,8 @@ use super::run::Places;
 use super::score::Z_NAMEABLE;
 
 /// Fits the library's effects to the physics of each set that has a label, until a wrong one is nearer than [`Z_NAMEABLE`], and keeps the
-/// fits there, for the scorer only. Points of the library's own parameters are in no score and get none. Labels that have fits are kept
-/// as they are. Workers that have the same folders share the sets.
+/// fits there, for the scorer only. Points of the library's own parameters are in no score, and outside the library every name is wrong:
+/// neither gets fits. Labels that have fits are kept as they are. Workers that have the same folders share the sets.
 ///
 /// # Errors
 /// If a label cannot be read or written.
@@ -48,16 +48,16 @@ impl Work for Separations<'_> {
 
     fn is_done(&self, set: &Planned) -> Result<bool> {
         let label = self.label(set)?;
-        Ok(label.is_none_or(|label| !label.physics.iter().any(lacks_fits)))
+        Ok(label.is_none_or(|label| label.physics.iter().all(|dosed| unfitted(dosed).is_none())))
     }
 
     fn make(&self, set: &Planned, stop: &Stop) -> Result<Option<Label>> {
         let mut label = self.label(set)?.with_context(|| format!("{} had a label", set.id))?;
-        for dosed in label.physics.iter_mut().filter(|dosed| lacks_fits(dosed)) {
+        for dosed in &mut label.physics {
+            let Some(right) = unfitted(dosed).map(str::to_owned) else { continue };
             let (recipe, physics) = (set.recipe.clone(), dosed.clone());
-            let Some(fits) = stop.unless_set(move || recipe.class_fits(&physics, Z_NAMEABLE)) else {
-                return Ok(None);
-            };
+            let fits = stop.unless_set(move || recipe.class_fits(&physics, &right, Z_NAMEABLE));
+            let Some(fits) = fits else { return Ok(None) };
             dosed.z_of_effects = fits.with_context(|| set.id.clone())?.effects;
         }
         Ok(Some(label))
@@ -70,8 +70,9 @@ impl Work for Separations<'_> {
     }
 }
 
-fn lacks_fits(dosed: &PhysicsLabel) -> bool {
-    !dosed.is_library_point && dosed.z_of_effects.is_empty()
+/// The effect of a physics that lacks its fits.
+fn unfitted(dosed: &PhysicsLabel) -> Option<&str> {
+    dosed.effect.as_deref().filter(|_| !dosed.is_library_point && dosed.z_of_effects.is_empty())
 }
 
 #[cfg(test)]

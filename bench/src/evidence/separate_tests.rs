@@ -42,7 +42,7 @@ fn a_label_gets_its_separation_once() -> Result<()> {
     let (label, done) = separated("late-frames-clock", 1.0)?;
     assert_eq!(done, [1, 0]);
     let fits = fits(&label)?;
-    let nearest = fits.z_name(Some("time-lag")).context("it is an effect")?;
+    let nearest = fits.z_name("time-lag").context("it is an effect")?;
     assert!(nearest > 0.0 && nearest <= 1.001 * fits.base, "{nearest} of {}", fits.base);
     Ok(())
 }
@@ -58,7 +58,7 @@ fn the_fits_end_where_a_wrong_effect_is_near() -> Result<()> {
 
 #[test]
 fn a_far_physics_has_fits_of_all_effects() -> Result<()> {
-    let (label, _) = separated("grounding", 1.0)?;
+    let (label, _) = separated("sheared-stage", 1.0)?;
     assert_eq!(fits(&label)?.effects.len(), REGISTRY.len());
     Ok(())
 }

@@ -51,7 +51,7 @@ fn row(f: &mut fmt::Formatter<'_>, campaign: Campaign, sets: &[&Outcome]) -> fmt
         SetSize { mean, .. } => write!(f, "{mean:>6.2}")?,
     }
     write!(f, "{:>7}{failed:>8}", count(|set| !set.wrong_names().is_empty()))?;
-    let own = sets.iter().filter_map(|set| set.shrink_to_own_fit());
+    let own = sets.iter().filter_map(|set| set.shrink_to_fit_in_report());
     match Shrink::new(own) {
         Shrink { of, median: Some(median), fifth: Some(fifth) } => {
             writeln!(f, "  {median:.3}, {fifth:.3} ({of})")

@@ -25,11 +25,10 @@ pub struct ClassFits {
 
 impl ClassFits {
     /// `min over wrong c of sqrt(max(0, z_c^2 - z_true^2))`: how far the nearest wrong effect fits worse than the true one, of those that
-    /// are fitted. Of physics outside the library (`None`) every effect is wrong, and the truth leaves nothing. An effect that is neutral
-    /// leaves what the base model leaves, and none fits worse.
-    pub fn z_name(&self, effect: Option<&str>) -> Option<f64> {
-        let right = effect.map_or(Some(0.0), |effect| self.effects.get(effect).copied())?.min(self.base);
-        let wrong = self.effects.iter().filter(|(name, _)| Some(name.as_str()) != effect).map(|(_, z)| *z);
+    /// are fitted. An effect that is neutral leaves what the base model leaves, and none fits worse. `None` if the true one is not fitted.
+    pub fn z_name(&self, effect: &str) -> Option<f64> {
+        let right = self.effects.get(effect)?.min(self.base);
+        let wrong = self.effects.iter().filter(|(name, _)| *name != effect).map(|(_, z)| *z);
         Some((wrong.fold(self.base, f64::min).powi(2) - right.powi(2)).max(0.0).sqrt())
     }
 
@@ -74,19 +73,17 @@ impl<'a> Fitter<'a> {
         Self { oracle, with, images, plain: oracle.clean.clone() }
     }
 
-    /// The fits of effects, in full those of the right one, if there is one, and of the nearest others. They end with a wrong one whose
-    /// [`ClassFits::z_name`] is below `enough`: a nearer one would tell nothing more.
-    pub(crate) fn until(&self, right: Option<&'static Definition>, enough: f64) -> ClassFits {
-        let name = right.map(|right| right.name);
-        let base = ClassFits { base: self.base_z(), effects: BTreeMap::new() };
-        let mut fits = right.map_or(base, |right| self.one(right));
-        let is_enough = |fits: &ClassFits| fits.z_name(name).is_some_and(|z| z < enough);
-        let is_twin = |other: &&Definition| right.is_some_and(|right| right.near_twins.contains(&other.name));
+    /// The fits of effects, in full those of the right one and of the nearest others. They end with a wrong one that makes
+    /// [`ClassFits::z_name`] less than `enough`: a nearer one would tell nothing more.
+    pub(crate) fn until(&self, right: &'static Definition, enough: f64) -> ClassFits {
+        let mut fits = self.one(right);
+        let is_enough = |fits: &ClassFits| fits.z_name(right.name).is_some_and(|z| z < enough);
+        let is_twin = |other: &&Definition| right.near_twins.contains(&other.name);
         let (twins, strangers): (Vec<&'static Definition>, Vec<_>) =
             REGISTRY.iter().copied().partition(is_twin);
         let mut guesses = Vec::new();
-        for other in twins.into_iter().chain(strangers).filter(|other| Some(other.name) != name) {
-            if !fits.effects.is_empty() && is_enough(&fits) {
+        for other in twins.into_iter().chain(strangers).filter(|other| other.name != right.name) {
+            if is_enough(&fits) {
                 return fits;
             }
             let guess = self.first(other);

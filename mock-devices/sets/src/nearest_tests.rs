@@ -46,18 +46,17 @@ fn a_library_point_is_fitted_by_the_librarys_own_form() {
 fn the_nearest_wrong_effect_counts() {
     let effects = [("a", 3.0), ("b", 5.0), ("c", 40.0)].map(|(name, z)| (name.to_owned(), z));
     let fits = ClassFits { base: 50.0, effects: effects.into() };
-    assert_eq!(fits.z_name(Some("a")), Some(4.0));
-    assert_eq!(fits.z_name(Some("b")), Some(0.0));
-    assert_eq!(fits.z_name(Some("d")), None);
-    assert_eq!(fits.z_name(None), Some(3.0));
+    assert_eq!(fits.z_name("a"), Some(4.0));
+    assert_eq!(fits.z_name("b"), Some(0.0));
+    assert_eq!(fits.z_name("d"), None);
 }
 
 #[test]
 fn no_effect_fits_worse_than_the_base_model() {
     let effects = [("a", 3.0), ("b", 460.0), ("c", 52.0)].map(|(name, z)| (name.to_owned(), z));
     let fits = ClassFits { base: 5.0, effects: effects.into() };
-    assert_eq!(fits.z_name(Some("a")), Some(4.0));
-    assert_eq!(fits.z_name(Some("b")), Some(0.0));
+    assert_eq!(fits.z_name("a"), Some(4.0));
+    assert_eq!(fits.z_name("b"), Some(0.0));
 }
 
 #[test]

@@ -181,13 +181,13 @@ impl Recipe {
         DataSet { rig: base.rig.clone(), rows, label }
     }
 
-    /// The fits of effects of the library to one physics of this set's label, alone and without noise. They end with a wrong one whose
-    /// [`ClassFits::z_name`] is below `enough`.
+    /// The fits of effects of the library, one of which is right, to one physics of this set's label, alone and without noise. They end
+    /// with a wrong one that makes [`ClassFits::z_name`] less than `enough`.
     ///
     /// # Errors
     /// As [`Recipe::make`].
-    pub fn class_fits(&self, of: &PhysicsLabel, enough: f64) -> Result<ClassFits, RecipeError> {
-        let right = of.effect.as_deref().map(known).transpose()?;
+    pub fn class_fits(&self, of: &PhysicsLabel, right: &str, enough: f64) -> Result<ClassFits, RecipeError> {
+        let right = known(right)?;
         self.fitted(of, |fitter| fitter.until(right, enough))
     }
 
