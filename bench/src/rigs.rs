@@ -371,7 +371,7 @@ async fn start_runs(endpoint: &Endpoint, names: &[String], script: &str) -> Resu
 
 /// Resets a rig and starts a run on it.
 async fn start_run(client: &Client, script: &str) -> Result<()> {
-    let held = timeout(PATIENCE, held(client)).await??;
+    let held = held(client).await?;
     let (who, lease) = ("bench".to_owned(), held.secret());
     let request = pb::CommandRequest { who: who.clone(), lease: lease.clone(), ..Default::default() };
     let reply = client.command(Command::Reset, &request, PATIENCE).await?;
@@ -391,11 +391,13 @@ async fn start_run(client: &Client, script: &str) -> Result<()> {
 
 /// The lease of a rig. A service that starts hundreds of runs may answer late, and then keeps the lease for nobody until it ends.
 async fn held(client: &Client) -> Result<HeldLease> {
+    let until = Instant::now() + PATIENCE;
     loop {
         match client.hold("bench", None).await {
             Ok(Hold::Held(held)) => return Ok(held),
+            Ok(Hold::Refused(reply)) if until < Instant::now() => bail!(reply.error),
             Ok(Hold::Refused(_)) => sleep(AGAIN).await,
-            Err(BusError::NoAnswer { .. }) => {}
+            Err(BusError::NoAnswer { .. }) if Instant::now() < until => {}
             Err(error) => return Err(error.into()),
         }
     }

@@ -141,7 +141,7 @@ impl BusConfig {
             // default is 5 s.
             ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(100_000)),
         ];
-        if !waits_for_room(rigs.len()) {
+        if !waits_for_room(rigs.len() + self.guests.len()) {
             // Zenoh's default is 1 ms, and 50 ms more for a message of many parts.
             settings.extend([
                 ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", json!(0)),

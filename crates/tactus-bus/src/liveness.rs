@@ -21,11 +21,11 @@ use zenoh::{
 
 use crate::BusError;
 
-/// What a client asks for, each by itself. A zenoh node compares each of its tokens with every key that an asked one matches: of `tactus/**`,
-/// which all keys of a rig match, a client cost a service of 800 rigs a second of the processor.
+/// The keys of both tokens. For each key that a client asks for, a zenoh node compares every token with every key that the asked one matches:
+/// with `tactus/**`, which all keys of all rigs match, a client cost a service of 800 rigs a second of the processor.
 const ANNOUNCEMENTS: [&str; 2] = ["tactus/*/alive", "tactus/*/service/*"];
-/// Nobody's key.
-const NOBODY: &str = "tactus/nobody";
+/// Nobody has such a key. It has a wild card for the reason that [`heard`](crate::topic::heard) gives.
+const NOBODY: &str = "tactus/nobody$*";
 /// Time limit for the list of services when a client connects.
 const ROLL_CALL_TIMEOUT: Duration = Duration::from_secs(3);
 

@@ -46,3 +46,22 @@ fn the_service_that_a_client_is_connected_to_is_believed_before_one_that_was_ann
     assert_eq!(known.believes("sim", &id(1)), Some(true));
     assert_eq!(known.believes("sim", &id(2)), Some(false));
 }
+
+#[test]
+fn what_a_client_asks_for_has_no_number_on_the_bus() {
+    // Why: crate::topic::heard.
+    for key in ANNOUNCEMENTS.into_iter().chain([NOBODY]) {
+        assert!(zenoh::key_expr::KeyExpr::try_from(key).unwrap().is_wild(), "{key}");
+    }
+}
+
+#[test]
+fn the_announcements_are_both_tokens_and_nobody_is_neither() {
+    let keys = Keys::new("bench");
+    let tokens = [keys.alive(), keys.instance("1f")];
+    for (announced, token) in ANNOUNCEMENTS.into_iter().zip(&tokens) {
+        let key = |key: &str| zenoh::key_expr::KeyExpr::try_from(key.to_owned()).unwrap();
+        assert!(key(announced).includes(&key(token)));
+        assert!(!key(NOBODY).intersects(&key(token)));
+    }
+}

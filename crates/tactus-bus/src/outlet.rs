@@ -6,13 +6,14 @@
 //! Where many rigs call, the thread lets calls gather for a millisecond: it is woken once for all of them, and zenoh sends their
 //! messages in one packet.
 //!
-//! A service of one rig or two sends its frames from the task that has them, which spares the wake of a thread on each frame's way. That
-//! is as quick for the task as a call of the thread, because such a service lets zenoh drop a message for a full link at once.
+//! In a service of one rig or two who has a frame may send it itself, which spares the wake of a thread on the frame's way. Such a service
+//! lets zenoh drop a message for a full link at once. What may still wait are answers to a client that does not read, so that only
+//! frames at rest go this way.
 
 use std::{
     io,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
     thread::{self, JoinHandle},
@@ -33,13 +34,22 @@ const WAITING_BYTES_MAX: usize = 16 << 20;
 const AT_ONCE: usize = 64;
 /// Rigs that call at a time from which on calls gather.
 const MANY: usize = 3;
+/// Time in which calls gather.
+const GATHERING: Duration = Duration::from_millis(1);
+
+/// Who sends a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Way {
+    /// The thread, which is called.
+    Called,
+    /// Who has it, if nobody else is sending.
+    Direct,
+}
+
 /// True if zenoh waits a moment for room in a full link of a client before it drops a message, in a service of so many rigs.
 pub(crate) const fn waits_for_room(rigs: usize) -> bool {
     rigs >= MANY
 }
-
-/// Time in which calls gather.
-const GATHERING: Duration = Duration::from_millis(1);
 
 /// A rig's outgoing queues.
 #[derive(Debug)]
@@ -54,8 +64,8 @@ pub(crate) struct Outlet {
     queue: Queue<Outgoing>,
     /// Of who sends; `None` once all is sent, so that nothing of zenoh outlives the session.
     publishers: Mutex<Option<TopicPublishers>>,
-    /// Who has a message sends it, unless another is sending.
-    is_direct: bool,
+    /// Nobody but the thread sends, because it gathers the messages of many rigs.
+    gathers: bool,
     /// The thread has been called and has not come yet.
     is_called: AtomicBool,
     caller: Caller,
@@ -98,23 +108,24 @@ impl Outlet {
         let capacity = match lane {
             // 10 s.
             Lane::Frames => 300,
-            // Far more than a run sends while stalled clients cost a millisecond per message each.
+            // Far more than a run sends while stalled clients cost a millisecond per message each, where zenoh waits for room.
             Lane::Updates => 8_192,
         };
         let queue = Queue::bounded(capacity, WAITING_BYTES_MAX, |message: &Outgoing| message.payload.len());
         let publishers = Mutex::new(Some(publishers));
         let (is_called, finished) = (AtomicBool::new(false), Notify::new());
-        let is_direct = lane == Lane::Frames && !waits_for_room(rigs);
-        Arc::new(Self { queue, publishers, is_direct, is_called, caller, finished })
+        let gathers = waits_for_room(rigs);
+        Arc::new(Self { queue, publishers, gathers, is_called, caller, finished })
     }
 
     /// Appends a message; returns the one that gave way to it, if the queue is full.
-    pub(crate) fn push(self: &Arc<Self>, message: Outgoing) -> Option<Outgoing> {
+    pub(crate) fn push(self: &Arc<Self>, message: Outgoing, way: Way) -> Option<Outgoing> {
         let displaced = self.queue.push(message);
-        if self.is_direct
+        if way == Way::Direct
+            && !self.gathers
             && let Ok(publishers) = self.publishers.try_lock()
         {
-            self.send_as(publishers);
+            self.send_turn(publishers.as_ref());
         } else {
             // Whoever sends now may have seen the queue without this message.
             self.call();
@@ -140,23 +151,23 @@ impl Outlet {
         }
     }
 
-    /// Sends what waits, but no more than is one rig's turn.
+    /// The thread's turn.
     fn send(self: &Arc<Self>) {
         // Before the queue is looked at: a message that comes later calls again.
         self.is_called.store(false, Ordering::Release);
-        self.send_as(self.publishers.lock().unwrap_or_else(PoisonError::into_inner));
+        let mut publishers = self.publishers.lock().unwrap_or_else(PoisonError::into_inner);
+        self.send_turn(publishers.as_ref());
+        if self.queue.is_finished() {
+            *publishers = None;
+            self.finished.notify_one();
+        }
     }
 
-    fn send_as(self: &Arc<Self>, mut publishers: MutexGuard<'_, Option<TopicPublishers>>) {
+    /// Sends what waits, but no more than is one rig's turn.
+    fn send_turn(self: &Arc<Self>, publishers: Option<&TopicPublishers>) {
         for _ in 0..AT_ONCE {
-            let Some(message) = self.queue.try_pop() else {
-                if self.queue.is_finished() {
-                    *publishers = None;
-                    self.finished.notify_one();
-                }
-                return;
-            };
-            if let Some(publishers) = &*publishers {
+            let Some(message) = self.queue.try_pop() else { return };
+            if let Some(publishers) = publishers {
                 publishers.publish(message);
             }
         }

@@ -1,4 +1,4 @@
-//! Publishing: calls that never wait, and the publishers of a rig's topics.
+//! Publishing: calls that never wait, but for one, and the publishers of a rig's topics.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, MissDetectionCon
 use crate::{
     BusError, Published,
     cache::{Cache, HistoryQuery, Source},
-    outlet::Outlets,
+    outlet::{Outlets, Way},
     queue::Queue,
     topic::{Lane, Policy, encoding, message_name},
 };
@@ -23,7 +23,7 @@ use crate::{
 /// Room for what a frame has beside its counts; where elements are bad, it may take more.
 const FRAME_BYTES: usize = 64;
 
-/// Publishes for the service. Cheap to clone; no call ever waits.
+/// Publishes for the service. Cheap to clone; no call ever waits, but for [`Publisher::publish_frame_directly`].
 #[derive(Debug, Clone)]
 pub struct Publisher {
     outlets: Arc<Outlets>,
@@ -43,21 +43,25 @@ impl Publisher {
 
     /// Publishes a frame on `sensor/frame`.
     pub fn publish_frame(&self, frame: &Frame) {
-        let mut payload = Vec::with_capacity(FRAME_BYTES + size_of::<f32>() * frame.counts.len());
-        frame.encode(&mut payload);
-        self.push(Topic::SensorFrame, payload);
+        self.push(Topic::SensorFrame, encoded(frame), Way::Called);
+    }
+
+    /// The same from this thread, of one rig or two: no other thread has to wake. It may wait for up to 100 ms where a client asks and does
+    /// not read, and so is for when nothing moves and nothing is recorded.
+    pub fn publish_frame_directly(&self, frame: &Frame) {
+        self.push(Topic::SensorFrame, encoded(frame), Way::Direct);
     }
 
     /// Publishes a message on its topic. When its queue is full the oldest message in it is dropped,
     /// counted and logged; after [`crate::Bus::close`] nothing is published any more.
     pub fn publish<M: Published>(&self, message: &M) {
-        self.push(M::TOPIC, message.encode_to_vec());
+        self.push(M::TOPIC, message.encode_to_vec(), Way::Called);
     }
 
-    fn push(&self, topic: Topic, payload: Vec<u8>) {
+    fn push(&self, topic: Topic, payload: Vec<u8>, way: Way) {
         let lane = Policy::of(topic).lane;
         let outlet = self.outlets.of(lane);
-        if outlet.push(Outgoing { topic, payload }).is_some() {
+        if outlet.push(Outgoing { topic, payload }, way).is_some() {
             let dropped = outlet.dropped();
             // One line each time the count doubles, to limit the log.
             if dropped.is_power_of_two() {
@@ -76,6 +80,12 @@ impl Publisher {
     pub fn dropped_updates(&self) -> u64 {
         self.outlets.updates.dropped()
     }
+}
+
+fn encoded(frame: &Frame) -> Vec<u8> {
+    let mut payload = Vec::with_capacity(FRAME_BYTES + size_of::<f32>() * frame.counts.len());
+    frame.encode(&mut payload);
+    payload
 }
 
 /// The publishers of one lane; no more room than they need, because every rig has them.

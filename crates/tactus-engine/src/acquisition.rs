@@ -258,7 +258,12 @@ impl Acquisition {
             };
         });
         self.tell_violation(violation);
-        self.shared.publish.frame(frame);
+        // Who moves the stage asks this task for each permit, after the claim: while it waits here, nothing can begin.
+        if self.recording.is_none() && !self.shared.control.borrow().claimed {
+            self.shared.publish.frame_at_rest(frame);
+        } else {
+            self.shared.publish.frame(frame);
+        }
         // The task is awake: it need not wake for the clock.
         if frame.received.mono.since(self.looked) >= self.look_period / 2 {
             self.on_time();

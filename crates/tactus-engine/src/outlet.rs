@@ -63,6 +63,10 @@ pub trait Publish: Send + Sync {
     fn sensor_info(&self, info: &pb::SensorInfo);
     /// One frame.
     fn frame(&self, frame: &Frame);
+    /// One frame, while nobody may move the stage and nothing is recorded: this call alone may take up to a tenth of a second.
+    fn frame_at_rest(&self, frame: &Frame) {
+        self.frame(frame);
+    }
     /// One report of the stage.
     fn stage(&self, state: &pb::StageState);
     /// One event of the run.

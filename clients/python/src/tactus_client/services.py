@@ -7,6 +7,10 @@ import threading
 
 import zenoh
 
+#: The keys of both tokens. `tactus/**`, which matches all keys of all rigs, would cost a service of many rigs much.
+ANNOUNCEMENTS = ("tactus/*/alive", "tactus/*/service/*")
+#: Nobody has such a key.
+NOBODY = "tactus/nobody$*"
 #: How long to wait for services to announce themselves.
 ROLL_CALL_TIMEOUT_S = 3.0
 
@@ -24,11 +28,11 @@ class Services:
         self._running: list[tuple[str, str]] = []
         self._believed: list[tuple[str, str]] = []
         # Direct: an indirect callback could still be on its way when the query below has ended.
-        self._subscriber = session.liveliness().declare_subscriber(
-            "tactus/**", zenoh.handlers.Callback(self._on_token, indirect=False), history=True
-        )
-        # The end of a query that was sent after the subscription shows that all present tokens were reported.
-        for _ in session.liveliness().get("tactus/**", timeout=ROLL_CALL_TIMEOUT_S):
+        hear = zenoh.handlers.Callback(self._on_token, indirect=False)
+        listen = session.liveliness().declare_subscriber
+        self._subscribers = [listen(key, hear, history=True) for key in ANNOUNCEMENTS]
+        # The end of a query that was sent after the subscriptions shows that all present tokens were reported.
+        for _ in session.liveliness().get(NOBODY, timeout=ROLL_CALL_TIMEOUT_S):
             pass
         self.neighbours = {str(peer) for peer in session.info.peers_zid()}
         with self._lock:

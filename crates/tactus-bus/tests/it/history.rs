@@ -1,7 +1,7 @@
 //! A client that joins late gets the history, once and in order.
 
 use crate::lab::{event, frame, open, open_with, settled};
-use tactus_bus::{BusConfig, Client, History, Losses};
+use tactus_bus::{BusConfig, Client, History, Losses, Publisher};
 use tactus_schema::pb;
 
 #[tokio::test(flavor = "multi_thread")]
@@ -129,7 +129,10 @@ async fn frames_that_several_tasks_send_at_a_time_all_arrive() {
     let senders = (0..4).map(|sender| {
         let publisher = service.bus.publisher();
         std::thread::spawn(move || {
-            (0..EACH).for_each(|number| publisher.publish_frame(&frame(sender * EACH + number)));
+            // Half of them call the thread.
+            let publish =
+                if sender % 2 == 0 { Publisher::publish_frame } else { Publisher::publish_frame_directly };
+            (0..EACH).for_each(|number| publish(&publisher, &frame(sender * EACH + number)));
         })
     });
     let senders: Vec<_> = senders.collect();

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use crate::lab::{Link, event, frame, open, raw_session};
-use tactus_bus::{Client, History};
-use tactus_schema::{key::Command, pb};
+use tactus_bus::{Client, History, Publisher};
+use tactus_schema::{Frame, key::Command, pb};
 use zenoh::query::{ConsolidationMode, ReplyKeyExpr};
 
 const FRAMES: u64 = 100_000;
@@ -12,18 +12,27 @@ const EVENTS: u64 = 5_000;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn frames_flow_past_a_client_that_stands_still_and_every_one_is_accounted_for() {
+    flow_past_a_client_that_stands_still(Publisher::publish_frame).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn so_do_frames_that_are_sent_directly() {
+    flow_past_a_client_that_stands_still(Publisher::publish_frame_directly).await;
+}
+
+async fn flow_past_a_client_that_stands_still(publish: fn(&Publisher, &Frame)) {
     let service = open("bench", &[]).await;
     let publisher = service.bus.publisher();
     let link = Link::to(&service.endpoint).await;
     let client = Client::connect(&link.endpoint, Some("bench")).await.unwrap();
     let mut frames = client.subscribe::<pb::Frame>(History::All).await.unwrap();
-    publisher.publish_frame(&frame(0));
+    publish(&publisher, &frame(0));
     assert_eq!(frames.recv().await.unwrap().seq, 0);
 
     link.stand_still();
     // The link flows again only after this loop: a call that waited for the client would wait for ever.
     for seq in 1..FRAMES {
-        publisher.publish_frame(&frame(seq));
+        publish(&publisher, &frame(seq));
     }
     link.flow();
 

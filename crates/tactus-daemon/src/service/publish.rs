@@ -15,6 +15,10 @@ impl Publish for BusPublisher {
         self.0.publish_frame(frame);
     }
 
+    fn frame_at_rest(&self, frame: &Frame) {
+        self.0.publish_frame_directly(frame);
+    }
+
     fn stage(&self, state: &pb::StageState) {
         self.0.publish(state);
     }

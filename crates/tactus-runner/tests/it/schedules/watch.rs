@@ -246,6 +246,17 @@ impl Publish for Witness {
         }
     }
 
+    fn frame_at_rest(&self, frame: &Frame) {
+        if self.control.is_moving() {
+            self.tell(
+                "rest",
+                format!("the stage moves at {:?}, and the frame may wait", self.control.tip_mm()),
+            );
+        }
+        self.count("frames", "at rest");
+        self.frame(frame);
+    }
+
     fn event(&self, event: &pb::RunEvent) {
         if let Some(Event::DwellDone(dwell)) = &event.event {
             self.check_dwell(dwell);
