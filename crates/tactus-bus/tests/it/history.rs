@@ -137,10 +137,12 @@ async fn frames_that_several_tasks_send_at_a_time_all_arrive() {
     });
     let senders: Vec<_> = senders.collect();
     let mut seen = std::collections::BTreeSet::new();
-    while seen.len() < 4 * EACH as usize {
+    while (seen.len() as u64) < 4 * EACH {
         seen.insert(frames.recv().await.unwrap().seq);
     }
-    senders.into_iter().for_each(|sender| sender.join().unwrap());
+    for sender in senders {
+        sender.join().unwrap();
+    }
     assert_eq!(frames.losses().missed, 0);
     service.bus.close().await.unwrap();
 }

@@ -1,5 +1,7 @@
 //! A stalled client does not affect others, and its losses are counted.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::time::Duration;
 
 use crate::lab::{Link, event, frame, open, raw_session};
