@@ -366,7 +366,8 @@ async fn start_runs(endpoint: &Endpoint, names: &[String], script: &str) -> Resu
     while let Some(started) = starting.join_next().await {
         started??;
     }
-    Ok(())
+    let lab = Arc::into_inner(lab).context("all runs are started")?;
+    Ok(lab.close().await?)
 }
 
 /// Resets a rig and starts a run on it.

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tactus_schema::key::Keys;
 use zenoh::Config;
 
-use crate::{BusError, Endpoint, access, error::of_zenoh, outlet::waits_for_room, topic::FRAMES_KEPT_MAX};
+use crate::{BusError, Endpoint, access, error::of_zenoh, outlet::MANY, topic::FRAMES_KEPT_MAX};
 
 /// Longest message that a service takes, in bytes. Zenoh collects a message of many parts in memory up to this size.
 const SERVICE_MESSAGE_BYTES_MAX: usize = 2 << 20;
@@ -120,6 +120,11 @@ impl BusConfig {
         Ok(())
     }
 
+    /// True if a service of these rigs and its guests gathers frames, and lets zenoh wait for room in a full link before it drops one.
+    pub(crate) fn gathers(&self, rigs: &[Keys]) -> bool {
+        rigs.len() + self.guests.len() >= MANY
+    }
+
     /// Zenoh's settings for the service of these rigs.
     pub(crate) fn service(&self, rigs: &[Keys]) -> Result<Config, BusError> {
         let listen = texts(&self.listen);
@@ -141,7 +146,7 @@ impl BusConfig {
             // default is 5 s.
             ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(100_000)),
         ];
-        if !waits_for_room(rigs.len() + self.guests.len()) {
+        if !self.gathers(rigs) {
             // Zenoh's default is 1 ms, and 50 ms more for a message of many parts.
             settings.extend([
                 ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", json!(0)),

@@ -41,8 +41,8 @@ pub struct Node {
     pub(crate) history_queries: Arc<Queue<HistoryQuery>>,
     pub(crate) stops: mpsc::Sender<Box<CommandCall>>,
     pub(crate) served: Served,
-    /// How many rigs it may serve or pass on.
-    pub(crate) rigs: usize,
+    /// [`BusConfig::gathers`].
+    pub(crate) gathers: bool,
     /// Frames that are kept of each rig.
     pub(crate) frames_kept: usize,
     command_replies: Worker<PendingReplies>,
@@ -98,7 +98,7 @@ impl Node {
             history_queries,
             stops,
             served,
-            rigs: rigs.len() + config.guests.len(),
+            gathers: config.gathers(rigs),
             frames_kept: frames_kept(config.frames_kept, rigs.len()),
             command_replies,
             history_replies,

@@ -33,7 +33,7 @@ const WAITING_BYTES_MAX: usize = 16 << 20;
 /// Messages of one rig that are sent before it is the next one's turn.
 const AT_ONCE: usize = 64;
 /// Rigs that call at a time from which on calls gather.
-const MANY: usize = 3;
+pub(crate) const MANY: usize = 3;
 /// Time in which calls gather.
 const GATHERING: Duration = Duration::from_millis(1);
 
@@ -44,11 +44,6 @@ pub(crate) enum Way {
     Called,
     /// Who has it, if nobody else is sending.
     Direct,
-}
-
-/// True if zenoh waits a moment for room in a full link of a client before it drops a message, in a service of so many rigs.
-pub(crate) const fn waits_for_room(rigs: usize) -> bool {
-    rigs >= MANY
 }
 
 /// A rig's outgoing queues.
@@ -102,8 +97,7 @@ impl Outlets {
 }
 
 impl Outlet {
-    /// That of one of so many rigs.
-    pub(crate) fn new(lane: Lane, publishers: TopicPublishers, caller: Caller, rigs: usize) -> Arc<Self> {
+    pub(crate) fn new(lane: Lane, publishers: TopicPublishers, caller: Caller, gathers: bool) -> Arc<Self> {
         // Drop-oldest, counted.
         let capacity = match lane {
             // 10 s.
@@ -114,7 +108,6 @@ impl Outlet {
         let queue = Queue::bounded(capacity, WAITING_BYTES_MAX, |message: &Outgoing| message.payload.len());
         let publishers = Mutex::new(Some(publishers));
         let (is_called, finished) = (AtomicBool::new(false), Notify::new());
-        let gathers = waits_for_room(rigs);
         Arc::new(Self { queue, publishers, gathers, is_called, caller, finished })
     }
 

@@ -74,8 +74,13 @@ impl Bus {
             TopicPublishers::declare(session, &keys, lane, node.frames_kept, &node.history_queries).await
         };
         let outlets = Outlets {
-            frames: Outlet::new(Lane::Frames, of_lane(Lane::Frames).await?, frames.caller(), node.rigs),
-            updates: Outlet::new(Lane::Updates, of_lane(Lane::Updates).await?, updates.caller(), node.rigs),
+            frames: Outlet::new(Lane::Frames, of_lane(Lane::Frames).await?, frames.caller(), node.gathers),
+            updates: Outlet::new(
+                Lane::Updates,
+                of_lane(Lane::Updates).await?,
+                updates.caller(),
+                node.gathers,
+            ),
         };
         let bus = Self { outlets: Arc::new(outlets), node, keys, _commands: queryable, _instance: instance };
         Ok((bus, commands))

@@ -6,7 +6,7 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tactus_hidden::{CATALOGUE, Climate, Definition, Dose, RandomRig};
-use tactus_model::effect::{self, EffectError, REGISTRY};
+use tactus_model::effect::{self, EffectError};
 use tactus_model::{ModelError, TrajectoryError};
 use tactus_schema::Rig;
 use tactus_schema::table::Row;
@@ -187,7 +187,7 @@ impl Recipe {
     /// # Errors
     /// As [`Recipe::make`].
     pub fn class_fits(&self, of: &PhysicsLabel, right: &str, enough: f64) -> Result<ClassFits, RecipeError> {
-        let right = known(right)?;
+        let right = effect::Definition::find(right)?;
         self.fitted(of, |fitter| fitter.until(right, enough))
     }
 
@@ -196,7 +196,7 @@ impl Recipe {
     /// # Errors
     /// As [`Recipe::make`].
     pub fn class_fit(&self, of: &PhysicsLabel, effect: &str) -> Result<ClassFits, RecipeError> {
-        let definition = known(effect)?;
+        let definition = effect::Definition::find(effect)?;
         self.fitted(of, |fitter| fitter.one(definition))
     }
 
@@ -384,12 +384,6 @@ struct Readings {
     rows: Vec<Row>,
     /// The counts of all rows without noise and quantisation.
     clean: Vec<f64>,
-}
-
-/// An effect of the library.
-fn known(effect: &str) -> Result<&'static effect::Definition, RecipeError> {
-    let found = REGISTRY.iter().copied().find(|known| known.name == effect);
-    found.ok_or_else(|| RecipeError::UnknownEffect(effect.into()))
 }
 
 /// A random physics among those that fulfil a condition.
