@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls hosts features vm discovery-slice gpu rigs-check fleet (fuzz "600") (truth "20") bare advisories
+nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls hosts features vm discovery-slice gpu rigs-check long-tests fleet (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -411,6 +411,10 @@ discovery-slice:
     rm -rf target/evidence/slice
     target/dist/tactus-bench evidence run --size slice --check \
         --work target/evidence/slice/work --labels target/evidence/slice/labels
+
+# Tests of discovery that CI is too short for: drafts of further physics, a refuted draft, two parts of a measured run.
+long-tests: build
+    cargo test --workspace --lib --test e2e -- --ignored drafting:: discover::
 
 # The part of that which CI runs, 11 sets, with the programs that the tests have built.
 discovery-sample: build

@@ -286,6 +286,7 @@ fn what_the_motors_couple_in_is_drafted_confirmed_and_named_on_another_rig() {
 }
 
 #[test]
+#[ignore = "a minute on two processors: `just long-tests`"]
 fn a_draft_that_a_new_run_does_not_show_is_refuted_and_the_next_one_has_another_name() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
@@ -547,6 +548,7 @@ fn a_measured_run_names_hardening_and_a_loop_with_its_causes() {
 /// The same data as two runs of five strokes each, of which the second was made after the rig was calibrated again and renamed: its
 /// zeros lie elsewhere, and all channels are 2 % more sensitive.
 #[test]
+#[ignore = "a minute on two processors: `just long-tests`"]
 fn two_parts_of_a_measured_run_do_not_contradict_each_other() {
     let data = repository("../shared/data/eflesh-normal-20250401_014340.parquet");
     if !data.is_file() {

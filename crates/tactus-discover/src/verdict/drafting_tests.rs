@@ -138,6 +138,7 @@ fn what_swings_after_a_stop_is_drafted_frame_by_frame() {
 
 /// In each press each element has another offset, which nothing describes, beside counts that come with contact.
 #[test]
+#[ignore = "some 20 s on two processors: `just long-tests`"]
 fn a_draft_of_the_smaller_part_is_told_and_none() {
     let of_each = processes(30 * ELEMENTS, 4.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(3));
     let touches = |frame: usize, _: &[f64], depth_mm: f64, element: usize| {
@@ -255,6 +256,7 @@ fn what_may_close_enough_or_not_is_no_answer() {
 
 /// `heavy-tail` is tried first and follows a part of it.
 #[test]
+#[ignore = "some 20 s on two processors: `just long-tests`"]
 fn a_name_gives_way_to_what_is_drafted_without_it_and_explains_as_much() {
     let (known, frames) = with(|rises, _, _| 0.01 * rises.iter().sum::<f64>());
     let found = found(&known, &frames);
@@ -271,6 +273,7 @@ fn a_name_gives_way_to_what_is_drafted_without_it_and_explains_as_much() {
 
 /// It lets go so low that knots at equal numbers of frames would not see it.
 #[test]
+#[ignore = "some 20 s on two processors: `just long-tests`"]
 fn a_covering_that_sticks_to_the_leaving_tool_is_drafted_by_its_height() {
     const LETS_GO_MM: f64 = 0.2;
     let way = |within: usize| match within {
@@ -308,6 +311,7 @@ fn a_covering_that_sticks_to_the_leaving_tool_is_drafted_by_its_height() {
 
 /// Each separation leaves charge at its place, which fades and is felt in later presses too. The nearest effect follows a part of that.
 #[test]
+#[ignore = "some 20 s on two processors: `just long-tests`"]
 fn a_name_that_closes_less_than_an_effect_closes_of_its_own_is_tentative() {
     let known = known();
     let clean = measured(&known, &[], &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
