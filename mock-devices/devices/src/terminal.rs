@@ -20,7 +20,7 @@ use tokio::task::JoinSet;
 
 use crate::cable::ByteStream;
 
-/// A port with one pseudo-terminal at a time, and a link that always points to the current one.
+/// A port with one pseudo-terminal at a time, and a link that points to the current one and is gone without one.
 #[derive(Debug)]
 pub struct TerminalPort {
     link: Option<PathBuf>,
@@ -80,8 +80,10 @@ impl TerminalPort {
         }
     }
 
-    /// Hangs up on the host; the link points nowhere until the next [`open`](Self::open).
+    /// Hangs up on the host; there is no link until the next [`open`](Self::open).
     pub fn close(&mut self) {
+        // First the link: any program may get the freed number, and the link would lead to its terminal.
+        self.remove_link();
         self.terminal = None;
     }
 
@@ -101,6 +103,16 @@ impl TerminalPort {
         }
         tracing::info!(path = %terminal.path.display(), "pseudo-terminal opened");
         Ok(self.terminal.insert(terminal))
+    }
+
+    fn remove_link(&self) {
+        // Another program may have replaced the link meanwhile: then it is not ours to remove.
+        if let (Some(link), Some(terminal)) = (&self.link, &self.terminal)
+            && fs::read_link(link).is_ok_and(|target| target == terminal.path)
+            && let Err(error) = fs::remove_file(link)
+        {
+            tracing::warn!(link = %link.display(), %error, "the link could not be removed");
+        }
     }
 }
 
@@ -159,13 +171,7 @@ fn is_opening(event: &[u8; EVENT_BYTES]) -> bool {
 
 impl Drop for TerminalPort {
     fn drop(&mut self) {
-        // Another program may have replaced the link meanwhile: then it is not ours to remove.
-        if let (Some(link), Some(terminal)) = (&self.link, &self.terminal)
-            && fs::read_link(link).is_ok_and(|target| target == terminal.path)
-            && let Err(error) = fs::remove_file(link)
-        {
-            tracing::warn!(link = %link.display(), %error, "the link could not be removed");
-        }
+        self.remove_link();
     }
 }
 

@@ -18,6 +18,7 @@ use tactus_device::{
 use tactus_safety::Supervisor;
 use tactus_schema::rig::{GrblAxes, StageProtocol};
 use tactus_schema::{Frame, MonoTime, Rig, pb};
+use tactus_virtual::TerminalPort;
 use tactus_wire::weiss::{self as wire, Decoder};
 use tokio::io::AsyncReadExt;
 
@@ -201,6 +202,20 @@ async fn the_production_drivers_work_with_it() {
         assert_eq!(after[0].epoch, before[0].epoch + epochs, "{command}");
     }
     assert!(mock.terminate());
+}
+
+/// The freed number of an unplugged pseudo-terminal may be another program's next one: a link that stayed would lead hosts
+/// there.
+#[tokio::test]
+async fn while_it_is_unplugged_there_is_no_link() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("sensor");
+    let mut port = TerminalPort::new(Some(link.clone())).unwrap();
+    assert_eq!(fs::read_link(&link).unwrap(), port.path().unwrap());
+    port.close();
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    drop(port.open().unwrap());
+    assert_eq!(fs::read_link(&link).unwrap(), port.path().unwrap());
 }
 
 #[tokio::test]
