@@ -9,7 +9,7 @@ use std::{fs, thread};
 use rustix::fs::{CWD, Mode, mkfifoat};
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{CommandOutput, Process, Terminal, repository, tactus};
+use tactus_e2e::{CommandOutput, Process, Terminal, binary, computed, repository, tactus};
 use tactus_record::rows;
 use tactus_record::table::TableWriter;
 use tactus_schema::DraftFile;
@@ -330,6 +330,28 @@ fn a_draft_that_a_new_run_does_not_show_is_refuted_and_the_next_one_has_another_
     let again = confirm(&diagnosed(folder, &["--truth", "hidden.toml"], "6")).json();
     assert_eq!((&again["name"], &again["status"]), (&"draft-1".into(), &"confirmed".into()), "{again}");
     assert_eq!(again["file"], "drafts/draft-1.toml");
+}
+
+/// `low-pass` and `relaxation` together follow what rings after each stop, and leave little. One curve of the time since a stop follows it better.
+#[test]
+#[ignore = "a minute on two processors: `just long-tests`"]
+fn names_that_one_draft_outdoes_give_way_to_it() {
+    let folder = TempDir::new().unwrap();
+    let tactus = binary("tactus");
+    let set = ["evidence", "run", "--seeds", "tuning", "--campaign", "outside", "--only", "ringing-z100-1"];
+    let places = ["--tactus", tactus.to_str().unwrap(), "--work", "work", "--labels", "labels"];
+    let ran = computed("tactus-bench", folder.path(), &[&set[..], &places].concat());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let report = fs::read_to_string(folder.path().join("work/reports/outside/ringing-z100-1.json")).unwrap();
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!((&report["verdict"], &report["steps"]), (&"unexplained".into(), &Value::Array(Vec::new())));
+    let sentence = report["draft"]["sentence"].as_str().unwrap_or_else(|| panic!("{}", report["draft"]));
+    assert!(sentence.contains("time since a start or stop"), "{sentence}");
+    let given_up = report["given_up"].as_array().unwrap();
+    for name in ["low-pass", "relaxation"] {
+        let words = given_up.iter().find(|one| one["effect"] == name).map(|one| &one["because"]);
+        assert_eq!(words, Some(&"what is drafted without it explains as much".into()), "{given_up:?}");
+    }
 }
 
 /// Names of what is in a folder, in order.

@@ -76,6 +76,7 @@
 //!     summary: "every element loses a share of its signal",
 //!     parameters: &[Parameter::real("lost_share", 0.0, [0.0, 1.0])],
 //!     near_twins: &[],
+//!     acts_by: &[],
 //!     shown_by: &["element-centres"],
 //!     curve: None,
 //!     make: Make::Element(|values| Box::new(Loss { lost_share: values[0] })),

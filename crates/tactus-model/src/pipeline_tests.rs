@@ -267,6 +267,7 @@ fn a_path_that_is_late_is_asked_for_an_earlier_instant() {
         summary: "a lab's own effect",
         parameters: &[crate::effect::Parameter::real("lag_s", 0.0, [-1.0, 1.0])],
         near_twins: &[],
+        acts_by: &[],
         shown_by: &[],
         curve: None,
         make: Make::Motion(|values| Box::new(Late(values[0]))),

@@ -27,9 +27,15 @@ pub(super) fn page(top: &Path) -> Result<String> {
         let text: Vec<String> = text.lines().map(as_part).collect();
         let list =
             |names: &[&str]| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let covariates: Vec<&str> = effect.acts_by.iter().map(|covariate| covariate.name()).collect();
+        let by = if covariates.is_empty() {
+            String::new()
+        } else {
+            format!("Acts by: {}. ", covariates.join(", "))
+        };
         let _written = write!(
             page,
-            "\n## {}\n\n{}\n\nNear twins: {}. Shown by: {}.\n",
+            "\n## {}\n\n{}\n\n{by}Near twins: {}. Shown by: {}.\n",
             effect.name,
             text.join("\n"),
             list(effect.near_twins),

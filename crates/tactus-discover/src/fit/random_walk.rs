@@ -15,8 +15,8 @@
 //! Random walks given readings: G. Wahba, *Spline Models for Observational Data* (1990), ch. 1 and 4. Fits beside them
 //! (partial splines): P. Speckman, *J. R. Stat. Soc. B* 50 (1988) 413.
 
-use tactus_model::Effect;
 use tactus_model::effect::{Definition, Make, Now, OnReadout, Parameter};
+use tactus_model::{Covariate, Effect};
 
 use super::parameters::{Parameters, Term};
 use super::problem::Problem;
@@ -33,6 +33,7 @@ pub(crate) static RANDOM_WALK: Definition = Definition {
         Parameter::given("rms_counts", 0.0, [0.0, 1e6]),
     ],
     near_twins: &["imprint", "relaxation", "gain-drift"],
+    acts_by: &[Covariate::Time, Covariate::Press, Covariate::Temperature],
     shown_by: &["drift"],
     curve: None,
     make: Make::Readout(|_| Box::new(BesidePipeline)),

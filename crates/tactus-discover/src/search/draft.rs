@@ -66,6 +66,9 @@ pub(crate) struct Drafted {
     pub(crate) p_value: f64,
     /// Logarithm of its odds against none.
     pub(crate) ln_odds: f64,
+    /// The same, with a charge for each number of its law or table, for each weight, and for its choice from the grammar: what names are compared
+    /// with, of which each number is charged.
+    pub(crate) ln_odds_as_chosen: f64,
     /// In how many of five folds it came first.
     pub(crate) folds: usize,
     /// By how much it is nearer to presses that its curve has not seen, block by block.
@@ -308,7 +311,10 @@ impl Search<'_> {
             return Ok(Err(NoDraft::NoGain));
         }
         let alike = field.alike(best);
+        let numbers = covariance.len() + draft.weights.as_ref().map_or(0, Vec::len);
+        let ln_odds_as_chosen = self.ln_odds_of_numbers(at, &with, numbers) - field.count.ln();
         Ok(Ok(Box::new(Drafted {
+            ln_odds_as_chosen,
             draft,
             at: with,
             covariance,

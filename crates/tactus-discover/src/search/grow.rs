@@ -516,8 +516,13 @@ impl Search<'_> {
     /// prior were as wide as its part of the gain allows.
     pub(crate) fn ln_odds(&self, less: &Fitted, more: &Fitted) -> f64 {
         let numbers = |fitted: &Fitted| -> usize { fitted.parameters.terms.iter().map(Term::numbers).sum() };
+        self.ln_odds_of_numbers(less, more, numbers(more).saturating_sub(numbers(less)))
+    }
+
+    /// The same where the further terms have so many numbers.
+    pub(super) fn ln_odds_of_numbers(&self, less: &Fitted, more: &Fitted, numbers: usize) -> f64 {
         let gain = (less.cost - more.cost) / (2.0 * self.problem.variance * self.rounding_excess(more));
-        let count = numbers(more).saturating_sub(numbers(less)).max(1) as f64;
+        let count = numbers.max(1) as f64;
         gain - 0.5 * count * (2.0 * gain.max(0.0) / count).ln_1p() - ODDS_AGAINST.ln()
     }
 

@@ -1,8 +1,11 @@
 //! Each class of a grown model has to hold its place: against the model without it, against rivals without a name, and against every other
 //! class, each in its place. Classes that the data cannot tell apart in one place are reported as one set.
 
+use tactus_model::Covariate;
+
 use super::contests::Contest;
-use super::evidence::Set;
+use super::draft::Drafted;
+use super::evidence::{Set, excused};
 use super::given_up::{Because, GivenUp};
 use super::grow::{
     ALPHA, Alike, Beside, Equivalent, FORM_SHARE, Grown, Held, LN_ODDS_LEAST, POLISH_ROUNDS, PROMISE_SHARE,
@@ -182,6 +185,44 @@ impl Search<'_> {
     /// What is small beside the gain of the draft may be the draft's form.
     pub(crate) fn is_needless(&self, draft_ln_odds: f64, [alone, both]: [&Fitted; 2]) -> bool {
         self.ln_odds(alone, both) < LN_ODDS_LEAST.max(FORM_SHARE * draft_ln_odds)
+    }
+
+    /// True if the odds of a draft exceed those of all names together, by which one model is ahead of the other, by more than the misfit for which
+    /// forms are excused.
+    pub(crate) fn is_outdone(&self, [less, named]: [&Fitted; 2], draft: &Drafted) -> bool {
+        let ln_odds = self.ln_odds(less, named);
+        draft.ln_odds_as_chosen > ln_odds + excused(ln_odds)
+    }
+
+    /// True if a name of a model acts by a covariate.
+    pub(crate) fn acts_by(&self, at: &Fitted, name: &str, covariate: Covariate) -> bool {
+        self.added(at, name).any(|term| term.definition.acts_by.contains(&covariate))
+    }
+
+    /// A model with one of its names only.
+    pub(crate) fn with_one_name(&self, at: &Fitted, name: &str) -> Result<Fitted, DiscoverError> {
+        let names = names(&at.parameters, self.known_terms);
+        let others: Vec<&str> = names.into_iter().filter(|other| *other != name).collect();
+        if others.is_empty() {
+            return Ok(at.clone());
+        }
+        let only =
+            others.iter().fold(at.parameters.clone(), |less, other| without(&less, other, self.known_terms));
+        self.problem.fit_from(only, POLISH_ROUNDS)
+    }
+
+    /// True if a name of a grown model explains little beside a draft that was made without any.
+    pub(crate) fn is_needless_beside(
+        &self,
+        grown: &Fitted,
+        name: &str,
+        draft: &Drafted,
+    ) -> Result<bool, DiscoverError> {
+        let of_name = self.added(grown, name);
+        let both = of_name.fold(draft.at.parameters.clone(), |both, term| both.with(term.clone()));
+        let both = self.problem.fit_from(both, POLISH_ROUNDS)?;
+        // A fit that does not come as near as the draft alone says nothing.
+        Ok(both.cost <= draft.at.cost && self.is_needless(draft.ln_odds, [&draft.at, &both]))
     }
 
     /// The class with the greatest odds in the place of one that has its formula, if it leaves hardly anything of what that one leaves with

@@ -94,7 +94,11 @@ impl Confirmed {
         let less = gone
             .iter()
             .fold(self.grown.parameters.clone(), |less, name| without(&less, name, search.known_terms));
-        let grown = search.problem.fit_from(less, POLISH_ROUNDS)?;
+        let grown = if prepared.base.parameters.has_terms_like(&less) {
+            prepared.base.clone()
+        } else {
+            search.problem.fit_from(less, POLISH_ROUNDS)?
+        };
         let steps = search.steps(&grown, equivalent, &self.refuted, &prepared.problem_with_silent())?;
         Ok(Self {
             grown,

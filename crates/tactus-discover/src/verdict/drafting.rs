@@ -15,7 +15,7 @@ use crate::search::{
 /// A draft that closes less of what was left on held-out presses is partial.
 const CLOSED_LEAST: f64 = 0.7;
 /// A draft describes what is left if it closes the better part of it on presses that no fit has seen.
-const BETTER_PART: f64 = 0.5;
+pub(super) const BETTER_PART: f64 = 0.5;
 
 /// An effect that was drafted, because no class explains what is left.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,14 +3,14 @@
 //!
 //! A name may stand for what nobody has named, because a draft is tried only after all names. So each name has to hold its place beside
 //! the draft: the model without it is judged and drafted anew. If the draft is of the same kind, and the model with it as near to the fitted presses,
-//! the name gives way.
+//! the name gives way. Before that, all names together are compared with one draft that is made without any of them.
 
 use std::sync::Arc;
 
 use super::closed::Closed;
 use super::confirmed::Confirmed;
 use super::discovery::{AddedEffect, Level, Verdict};
-use super::drafting::{Leaves, drafted};
+use super::drafting::{BETTER_PART, Leaves, drafted};
 use super::residual::{Presses, Residual, SEEN_NOISE};
 use super::structured::Structured;
 use crate::data::{DiscoverError, Floor, MISWIRED};
@@ -77,10 +77,55 @@ impl Judge<'_> {
     /// Judges a model without the names that give way to a draft.
     pub(super) fn judged(&self, confirmed: Confirmed) -> Result<Judged, DiscoverError> {
         let mut judged = self.judge(confirmed, Vec::new(), None)?;
+        judged = self.without_outdone_names(judged)?;
         while let Some(less) = self.without_a_needless_name(&judged)? {
             judged = less;
         }
         self.without_far_names(judged)
+    }
+
+    /// The model without the names that one draft outdoes: it alone, without any name, explains more than all of them together, and they hardly
+    /// anything beside it. The draft may be another form of a name that acts by the same covariate. If one name does, and by itself explains the
+    /// better part of what the draft does, all names stay.
+    fn without_outdone_names(&self, judged: Judged) -> Result<Judged, DiscoverError> {
+        let Self { prepared, search, equivalent, .. } = *self;
+        let (names, grown) = (self.named(&judged.confirmed), &judged.confirmed.grown);
+        if names.is_empty() || search.options.rule != Rule::Protocol {
+            return Ok(judged);
+        }
+        let given_up = |names: &[&'static str]| -> Vec<GivenUp> {
+            let gave_way = names.iter().map(|effect| GivenUp { effect, because: Because::Draft });
+            judged.given_up.iter().cloned().chain(gave_way).collect()
+        };
+        let nameless = judged.confirmed.without(&names, prepared, search, equivalent)?;
+        let against = Against::Names { nearest: names[0], cost: grown.cost };
+        let nameless = self.judge(nameless, given_up(&names), Some(against))?;
+        let base = &nameless.confirmed.grown;
+        let Some(Ok(alone)) = &nameless.draft else { return Ok(judged) };
+        if !search.is_outdone([base, grown], alone) {
+            return Ok(judged);
+        }
+        let acts_alike = |name: &&str| search.acts_by(grown, name, alone.draft.covariates[0]);
+        let alike: Vec<&str> = names.iter().copied().filter(acts_alike).collect();
+        if let [name] = alike[..] {
+            let only = search.with_one_name(grown, name)?;
+            if base.cost - only.cost > BETTER_PART * (base.cost - alone.at.cost) {
+                return Ok(judged);
+            }
+        }
+        let mut gone = Vec::new();
+        for name in &names {
+            if search.is_needless_beside(grown, name, alone)? {
+                gone.push(*name);
+            }
+        }
+        if gone.len() == names.len() {
+            return Ok(nameless);
+        }
+        let less = judged.confirmed.without(&gone, prepared, search, equivalent)?;
+        let less = self.judge(less, given_up(&gone), None)?;
+        let is_there = matches!(&less.draft, Some(Ok(beside)) if beside.is_like(alone));
+        Ok(if is_there && !gone.is_empty() { less } else { judged })
     }
 
     /// The model without the names that leave more of the gap than an effect leaves of its own physics. They come nearest, and are tentative; a

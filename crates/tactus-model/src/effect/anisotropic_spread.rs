@@ -22,6 +22,7 @@
 //! Stegun, *Handbook of Mathematical Functions* (1964), 25.4.46.
 
 use super::{By, Definition, Load, Make, Now, OnCovering, Parameter};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "anisotropic-spread",
@@ -31,6 +32,13 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("slant", 0.0, [-0.8, 0.8]).apart(),
     ],
     near_twins: &["crosstalk", "indenter-size", "misregistration", "sigma_intercept_mm"],
+    acts_by: &[
+        Covariate::Distance,
+        Covariate::ShareOfLargest,
+        Covariate::Depth,
+        Covariate::PlaceX,
+        Covariate::PlaceY,
+    ],
     shown_by: &["grid-sweep", "element-centres"],
     curve: None,
     make: Make::Covering(|values| Box::new(AnisotropicSpread { ratio: values[0], slant: values[1] })),

@@ -20,6 +20,7 @@
 //! The play operator: M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with Hysteresis* (1989).
 
 use super::{Definition, Make, Now, OnMotion, Parameter, TipState};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "backlash",
@@ -30,6 +31,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("play_z_mm", 0.0, [0.0, 0.5]),
     ],
     near_twins: &["hysteresis", "misregistration", "surface-offset", "time-lag"],
+    acts_by: &[Covariate::Direction, Covariate::ApproachX, Covariate::ApproachY, Covariate::Ahead],
     shown_by: &["approach", "ladder"],
     curve: None,
     make: Make::Motion(|values| Box::new(Backlash { axes: [0, 1, 2].map(|axis| Axis::new(values[axis])) })),

@@ -25,6 +25,7 @@
 
 use super::curve::Curve;
 use super::{Definition, Make, Now, OnReadout, Parameter};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "baseline-drift",
@@ -51,6 +52,7 @@ pub(super) static DEFINITION: Definition = Definition {
         offset("offset_16_counts"),
     ],
     near_twins: &["imprint", "relaxation", "gain-drift", "periodic-interference"],
+    acts_by: &[Covariate::Time, Covariate::Press, Covariate::Temperature],
     shown_by: &["drift"],
     curve: None,
     make: Make::Readout(|values| {

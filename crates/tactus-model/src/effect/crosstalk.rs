@@ -36,6 +36,7 @@
 use std::sync::OnceLock;
 
 use super::{BaseModel, Definition, Make, Now, OnElement, Parameter};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "crosstalk",
@@ -53,6 +54,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("in_counts_share", 0.0, [0.0, 1.0]).or_neutral(),
     ],
     near_twins: &["heavy-tail", "miswired", "anisotropic-spread", "sigma_intercept_mm"],
+    acts_by: &[Covariate::SumOfSignals, Covariate::ShareOfLargest, Covariate::Counts],
     shown_by: &["element-centres", "grid-sweep"],
     curve: None,
     make: Make::Element(|values| {

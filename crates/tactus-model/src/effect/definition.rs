@@ -5,6 +5,7 @@ use super::knots::{FreeCurve, KNOTS_MAX, Knots, Values};
 use super::table::{By, Table};
 use super::{OnContact, OnCovering, OnElement, OnMotion, OnReadout, REGISTRY};
 use crate::Array;
+use crate::trace::Covariate;
 
 /// An effect's name, parameters and relations. Its equation and source are in its file.
 #[derive(Debug)]
@@ -17,6 +18,8 @@ pub struct Definition {
     pub parameters: &'static [Parameter],
     /// Effects, and base parameters by their names in the model file, that look alike in much of the data.
     pub near_twins: &'static [&'static str],
+    /// Covariates by which it shows: a draft by one of them may be another form of it.
+    pub acts_by: &'static [Covariate],
     /// Experiments, or parts of `diagnose`, that show it.
     pub shown_by: &'static [&'static str],
     /// The free curve that may stand in place of its formula, if there is one.

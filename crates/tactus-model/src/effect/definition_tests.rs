@@ -70,6 +70,16 @@ fn a_definition_is_whole() {
         for part in definition.shown_by {
             assert!(PARTS.contains(part), "{name}: {part}");
         }
+        // What a parameter may be a table of, the effect is a function of.
+        for by in definition.parameters.iter().flat_map(|parameter| parameter.varies) {
+            let covariate = match by {
+                By::Depth => Covariate::Depth,
+                By::X => Covariate::PlaceX,
+                By::Y => Covariate::PlaceY,
+                By::Time => Covariate::Time,
+            };
+            assert!(definition.acts_by.contains(&covariate), "{name}: {covariate:?}");
+        }
         for twin in definition.near_twins {
             let is_mutual = Definition::find(twin).is_ok_and(|twin| twin.near_twins.contains(&name));
             assert!(is_mutual || BASE.contains(twin), "{name}: {twin}");

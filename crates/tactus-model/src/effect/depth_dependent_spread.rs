@@ -17,12 +17,14 @@
 //! thickness (Eq. 4); this is the first term that the line leaves out.
 
 use super::{By, Definition, Load, Make, Now, OnCovering, Parameter};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "depth-dependent-spread",
     summary: "the point spread changes with depth",
     parameters: &[Parameter::real("growth_share", 0.0, [-0.9, 5.0]).or_table_of(&[By::Depth])],
     near_twins: &["hardening", "saturation", "quadratic_per_mm"],
+    acts_by: &[Covariate::Depth, Covariate::Distance, Covariate::ShareOfLargest],
     shown_by: &["grid-sweep", "ladder", "tilt"],
     curve: None,
     make: Make::Covering(|values| Box::new(DepthDependentSpread { growth_share: values[0] })),

@@ -350,6 +350,7 @@ impl Draft {
             summary: &draft.sentence,
             parameters: if draft.phase_is_of_a_run() { &PARAMETERS } else { &PARAMETERS[..1] },
             near_twins: &[],
+            acts_by: &draft.covariates,
             shown_by: &[],
             curve: None,
             make: Make::Draft(draft),

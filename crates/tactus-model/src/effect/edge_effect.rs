@@ -28,6 +28,7 @@
 
 use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "edge-effect",
@@ -43,6 +44,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("corner_share", 0.0, [-1.0, 2.0]).apart(),
     ],
     near_twins: &["surface-tilt", "misregistration", "sensitivity_counts_per_mm"],
+    acts_by: &[Covariate::PlaceX, Covariate::PlaceY],
     shown_by: &["element-centres", "tilt", "corners"],
     curve: None,
     make: Make::Covering(|values| {

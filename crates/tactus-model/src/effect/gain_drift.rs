@@ -27,6 +27,7 @@
 
 use super::curve::Curve;
 use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnReadout, Parameter, Rises, Values};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "gain-drift",
@@ -42,6 +43,7 @@ pub(super) static DEFINITION: Definition = Definition {
         gain("gain_06_share"),
     ],
     near_twins: &["misregistration", "surface-tilt", "softening", "baseline-drift"],
+    acts_by: &[Covariate::Time, Covariate::Press, Covariate::Temperature],
     shown_by: &["repeats", "element-centres"],
     curve: Some(FreeCurve {
         at: "at_s",

@@ -36,6 +36,7 @@ use super::{
     BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises, Values,
 };
 use crate::Contact;
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "hardening",
@@ -46,6 +47,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("own_share", 0.0, [0.0, 1.0]),
     ],
     near_twins: &["saturation", "surface-offset", "depth-dependent-spread", "quadratic_per_mm"],
+    acts_by: &[Covariate::Depth, Covariate::Signal],
     shown_by: &["ladder", "element-centres"],
     curve: Some(FreeCurve {
         at: "at_mm",

@@ -31,6 +31,7 @@
 //! of the squared distance: I. J. Schoenberg, *Ann. Math.* 39 (1938) 811.
 
 use super::{CurveKind, Definition, FreeCurve, Knots, Load, Make, Now, OnCovering, Parameter, Rises, Values};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "heavy-tail",
@@ -40,6 +41,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("width_ratio", 2.0, [1.0, 10.0]),
     ],
     near_twins: &["crosstalk", "sigma_intercept_mm"],
+    acts_by: &[Covariate::Distance, Covariate::ShareOfLargest],
     shown_by: &["grid-sweep", "element-centres"],
     curve: Some(FreeCurve {
         at: "at_ratio",

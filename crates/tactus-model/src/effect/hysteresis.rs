@@ -47,6 +47,7 @@
 
 use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises, Values};
 use crate::Contact;
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "hysteresis",
@@ -58,6 +59,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("by_depth", 0.0, [0.0, 1.0]),
     ],
     near_twins: &["backlash", "softening", "relaxation", "imprint", "time-lag", "rate-stiffening"],
+    acts_by: &[Covariate::Direction, Covariate::Depth, Covariate::Signal],
     shown_by: &["ladder", "repeats"],
     curve: Some(FreeCurve {
         at: "at_mm",

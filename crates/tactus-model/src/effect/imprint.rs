@@ -31,6 +31,7 @@
 use super::lag::spread;
 use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises};
 use crate::Contact;
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "imprint",
@@ -41,6 +42,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("spread_ratio", 4.0, [1.0, 100.0]),
     ],
     near_twins: &["baseline-drift", "relaxation", "hysteresis", "low-pass"],
+    acts_by: &[Covariate::SinceRelease, Covariate::DeepestBefore],
     shown_by: &["hold", "repeats"],
     curve: Some(FreeCurve {
         at: "at_s",

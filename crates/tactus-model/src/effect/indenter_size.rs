@@ -17,6 +17,7 @@
 use std::sync::Arc;
 
 use super::{By, Definition, Make, Now, OnContact, Parameter};
+use crate::trace::Covariate;
 use crate::{Contact, Indenter};
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -24,6 +25,7 @@ pub(super) static DEFINITION: Definition = Definition {
     summary: "the tool is wider or narrower than declared",
     parameters: &[Parameter::real("ratio", 1.0, [0.2, 5.0]).or_table_of(&[By::Depth, By::Time])],
     near_twins: &["indenter-tilt", "anisotropic-spread", "sigma_intercept_mm", "sensitivity_counts_per_mm"],
+    acts_by: &[Covariate::Distance, Covariate::ShareOfLargest, Covariate::Depth, Covariate::Time],
     shown_by: &["grid-sweep", "element-centres"],
     curve: None,
     make: Make::Contact(|values| Box::new(IndenterSize { ratio: values[0] })),

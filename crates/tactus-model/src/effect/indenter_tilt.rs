@@ -23,6 +23,7 @@
 
 use super::{By, Definition, Make, Now, OnContact, Parameter};
 use crate::Contact;
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "indenter-tilt",
@@ -33,6 +34,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("touched_share", 0.5, [0.0, 1.0]),
     ],
     near_twins: &["misregistration", "surface-offset", "surface-tilt", "indenter-size"],
+    acts_by: &[Covariate::Distance, Covariate::Depth, Covariate::PlaceX, Covariate::PlaceY],
     shown_by: &["element-centres", "grid-sweep"],
     curve: None,
     make: Make::Contact(|values| {

@@ -29,12 +29,14 @@ use std::collections::VecDeque;
 
 use super::lag::Lags;
 use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnReadout, Parameter, Rises};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "low-pass",
     summary: "the readout is slow",
     parameters: &[Parameter::real("time_constant_s", 0.0, [0.0, 10.0])],
     near_twins: &["time-lag", "relaxation", "scan-skew", "rate-stiffening", "imprint"],
+    acts_by: &[Covariate::SinceTurn, Covariate::Speed, Covariate::TravelSpeed, Covariate::Direction],
     shown_by: &["rates", "ladder"],
     curve: Some(FreeCurve {
         at: "delay_s",

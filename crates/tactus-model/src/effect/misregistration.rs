@@ -23,6 +23,7 @@
 //! The paper's Sec. 2.1: two touches near opposite corners define the registration, which inherits their errors.
 
 use super::{By, Definition, Make, Now, OnMotion, Parameter, TipState};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "misregistration",
@@ -42,6 +43,7 @@ pub(super) static DEFINITION: Definition = Definition {
         "edge-effect",
         "anisotropic-spread",
     ],
+    acts_by: &[Covariate::PlaceX, Covariate::PlaceY, Covariate::InElementX, Covariate::InElementY],
     shown_by: &["corners", "element-centres", "grid-sweep"],
     curve: None,
     make: Make::Motion(|values| {

@@ -30,6 +30,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("other_share", 0.0, [-1.0, 1.0]),
     ],
     near_twins: &["crosstalk", "sensitivity_counts_per_mm"],
+    acts_by: &[],
     shown_by: &["element-centres"],
     curve: None,
     make: Make::Element(|values| {

@@ -24,6 +24,7 @@
 use std::f64::consts::TAU;
 
 use super::{Definition, Make, Now, OnReadout, Parameter};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "periodic-interference",
@@ -35,6 +36,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("phase_per_column_deg", 0.0, [-180.0, 180.0]),
     ],
     near_twins: &["baseline-drift", "noise_rms_counts"],
+    acts_by: &[Covariate::Time],
     shown_by: &["drift", "hold"],
     curve: None,
     make: Make::Readout(|values| {

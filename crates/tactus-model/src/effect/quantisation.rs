@@ -19,6 +19,7 @@
 //! A converter with fewer effective bits than its word has; missing codes: IEEE Std 1241-2010, section 4.7.
 
 use super::{Definition, Make, OnReadout, Parameter};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "quantisation",
@@ -30,6 +31,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::given("gap_low_share", 1.0, [0.0, 1.0]),
     ],
     near_twins: &["noise_rms_counts"],
+    acts_by: &[Covariate::Counts],
     shown_by: &["drift", "hold"],
     curve: None,
     make: Make::Readout(|values| {

@@ -32,6 +32,7 @@
 
 use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises, Values};
 use crate::Contact;
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "rate-stiffening",
@@ -42,6 +43,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("recovery_s", 1.0, [1e-3, 1e5]),
     ],
     near_twins: &["relaxation", "low-pass", "time-lag", "hysteresis"],
+    acts_by: &[Covariate::Speed, Covariate::SinceTurn],
     shown_by: &["rates"],
     curve: Some(FreeCurve {
         at: "at_mm_per_s",

@@ -47,6 +47,7 @@
 use super::lag::{Lags, spread};
 use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Rises};
 use crate::Contact;
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "relaxation",
@@ -68,6 +69,7 @@ pub(super) static DEFINITION: Definition = Definition {
         "baseline-drift",
         "softening",
     ],
+    acts_by: &[Covariate::SinceContact, Covariate::SinceRelease, Covariate::SinceTurn, Covariate::Depth],
     shown_by: &["hold", "rates", "repeats"],
     curve: Some(FreeCurve {
         at: "at_s",

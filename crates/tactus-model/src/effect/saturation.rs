@@ -32,6 +32,7 @@
 //! The compression of an amplifier: C. Rapp, *Effects of HPA-Nonlinearity on a 4-DPSK/OFDM-Signal* (1991).
 
 use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnElement, Parameter, Rises, Values};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "saturation",
@@ -42,6 +43,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("counts_share", 0.0, [0.0, 1.0]).or_neutral(),
     ],
     near_twins: &["hardening", "surface-offset", "depth-dependent-spread", "quadratic_per_mm"],
+    acts_by: &[Covariate::Signal, Covariate::Counts],
     shown_by: &["ladder", "element-centres"],
     curve: Some(FreeCurve {
         at: "at_mm",

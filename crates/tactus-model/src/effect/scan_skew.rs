@@ -24,6 +24,7 @@ use std::collections::VecDeque;
 
 use super::{Definition, Make, Now, OnReadout, Parameter};
 use crate::Array;
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "scan-skew",
@@ -33,6 +34,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("column_time_s", 0.0, [0.0, 0.1]),
     ],
     near_twins: &["time-lag", "low-pass"],
+    acts_by: &[Covariate::Speed, Covariate::TravelSpeed, Covariate::Direction],
     shown_by: &["rates"],
     curve: None,
     make: Make::Readout(|values| {

@@ -35,6 +35,7 @@ use libm::erf;
 
 use super::{CurveKind, Definition, FreeCurve, Make, Now, OnCovering, Parameter, Rises, Values};
 use crate::Contact;
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "softening",
@@ -45,6 +46,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("past_share", 0.0, [-1.0, 1.0]).or_neutral(),
     ],
     near_twins: &["hysteresis", "relaxation", "gain-drift"],
+    acts_by: &[Covariate::Depth, Covariate::DeepestBefore, Covariate::Signal],
     shown_by: &["repeats", "ladder"],
     curve: Some(FreeCurve {
         at: "at_share",

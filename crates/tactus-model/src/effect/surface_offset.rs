@@ -14,12 +14,14 @@
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
 
 use super::{By, Definition, Make, Now, OnMotion, Parameter, TipState};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "surface-offset",
     summary: "the covering's surface stands higher or lower than the touch that found it says",
     parameters: &[Parameter::real("offset_mm", 0.0, [-2.0, 2.0]).or_table_of(&[By::Time])],
     near_twins: &["saturation", "hardening", "backlash", "indenter-tilt"],
+    acts_by: &[Covariate::Time, Covariate::Depth],
     shown_by: &["corners", "element-centres", "ladder"],
     curve: None,
     make: Make::Motion(|values| Box::new(SurfaceOffset { offset_mm: values[0] })),

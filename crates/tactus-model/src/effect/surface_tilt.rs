@@ -18,6 +18,7 @@
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
 
 use super::{BaseModel, By, Definition, Make, Now, OnMotion, Parameter, TipState};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "surface-tilt",
@@ -29,6 +30,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("touched_y_mm", 0.0, [-50.0, 50.0]),
     ],
     near_twins: &["misregistration", "gain-drift", "indenter-tilt", "edge-effect"],
+    acts_by: &[Covariate::PlaceX, Covariate::PlaceY],
     shown_by: &["tilt", "element-centres"],
     curve: None,
     make: Make::Motion(|values| {

@@ -18,12 +18,20 @@
 //! (2008).
 
 use super::{Definition, Make, OnMotion, Parameter};
+use crate::trace::Covariate;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "time-lag",
     summary: "frames are late or early against the stage's positions",
     parameters: &[Parameter::real("lag_s", 0.0, [-1.0, 1.0])],
     near_twins: &["low-pass", "relaxation", "scan-skew", "backlash", "hysteresis", "rate-stiffening"],
+    acts_by: &[
+        Covariate::SinceTurn,
+        Covariate::Speed,
+        Covariate::TravelSpeed,
+        Covariate::Direction,
+        Covariate::Ahead,
+    ],
     shown_by: &["rates", "ladder"],
     curve: None,
     make: Make::Motion(|values| Box::new(TimeLag { lag_s: values[0] })),

@@ -64,6 +64,7 @@ fn show_known(known: &Definition) {
         ("what it is", known.summary.to_owned()),
         ("stage", stage_name(known.stage()).to_owned()),
         ("parameters", parameters.collect::<Vec<_>>().join(", ")),
+        ("acts by", acts_by(known).join(", ")),
         ("near twins", known.near_twins.join(", ")),
         ("shown by", known.shown_by.join(", ")),
     ]);
@@ -156,6 +157,11 @@ fn law(draft: &Draft) -> String {
     format!("{}: {}", draft.law.name(), numbers.collect::<Vec<_>>().join(", "))
 }
 
+/// What an effect of the library is a function of.
+fn acts_by(known: &Definition) -> Vec<&'static str> {
+    known.acts_by.iter().map(|covariate| covariate.name()).collect()
+}
+
 pub(super) fn of_library(known: &Definition) -> Value {
     json!({
         "name": known.name,
@@ -163,6 +169,7 @@ pub(super) fn of_library(known: &Definition) -> Value {
         "stage": stage_name(known.stage()),
         "summary": known.summary,
         "parameters": known.parameters.iter().map(|one| json!({ "name": one.name, "range": one.range })).collect::<Vec<_>>(),
+        "acts_by": acts_by(known),
         "near_twins": known.near_twins,
         "shown_by": known.shown_by,
     })
