@@ -6,6 +6,7 @@ use std::{
     fs,
     io::Write as _,
     path::{Path, PathBuf},
+    sync::LazyLock,
 };
 
 use rustix::process::Signal;
@@ -63,11 +64,12 @@ fn told(said: &str) -> [usize; 3] {
 }
 
 /// The results of one worker.
-fn alone(folder: &Path) -> [BTreeMap<PathBuf, Vec<u8>>; 2] {
-    let (code, said) = run(folder, &evidence("alone", &[]));
+static ALONE: LazyLock<[BTreeMap<PathBuf, Vec<u8>>; 2]> = LazyLock::new(|| {
+    let folder = TempDir::new().unwrap();
+    let (code, said) = run(folder.path(), &evidence("alone", &[]));
     assert_eq!((code, told(&said)), (Some(0), [SETS, 0, 0]), "{said}");
-    results(folder, "alone")
-}
+    results(folder.path(), "alone")
+});
 
 #[test]
 fn two_workers_share_the_sets_and_find_what_one_finds() {
@@ -91,7 +93,7 @@ fn two_workers_share_the_sets_and_find_what_one_finds() {
         assert_eq!(worker.iter().sum::<usize>(), SETS);
     }
     assert!(claims(folder, "shared").is_empty());
-    assert_eq!(results(folder, "shared"), alone(folder));
+    assert_eq!(results(folder, "shared"), *ALONE);
 }
 
 #[test]
@@ -106,7 +108,7 @@ fn the_set_of_a_killed_worker_is_taken_over() {
     let (code, said) = start(folder, &args).wait();
     assert_eq!((code, told(&said)), (Some(0), [SETS - done, 0, done]), "{said}");
     assert!(claims(folder, "shared").is_empty());
-    assert_eq!(results(folder, "shared"), alone(folder));
+    assert_eq!(results(folder, "shared"), *ALONE);
 }
 
 #[test]
@@ -131,7 +133,7 @@ fn a_stopped_worker_leaves_nothing_half_done_and_the_next_goes_on() {
     }
     let (code, said) = run(folder, &args);
     assert_eq!((code, told(&said)), (Some(0), [left, 0, done]), "{said}");
-    assert_eq!(results(folder, "shared"), alone(folder));
+    assert_eq!(results(folder, "shared"), *ALONE);
 }
 
 #[test]

@@ -128,6 +128,15 @@ pub(crate) struct Left {
     pub(crate) p_value: f64,
     /// Probability that each effect is missing; for one that the model has, that there is more of it.
     pub(crate) probabilities: Vec<(&'static str, f64)>,
+    /// Logarithm of the greatest odds of any class by itself.
+    ln_odds: f64,
+}
+
+impl Left {
+    /// True if some class by itself would gain enough to be added.
+    pub(crate) fn is_much(&self) -> bool {
+        self.ln_odds > LN_ODDS_LEAST
+    }
 }
 
 /// Results of one round.
@@ -287,7 +296,8 @@ impl Search<'_> {
             1.0 / (1.0 + ODDS_AGAINST * (-evidence / unit).exp())
         };
         let names = self.candidates.iter().map(|candidate| candidate.definition.name);
-        Ok(Left { p_value, probabilities: names.map(|name| (name, probability(name))).collect() })
+        let probabilities = names.map(|name| (name, probability(name))).collect();
+        Ok(Left { p_value, probabilities, ln_odds: pass.most_ln_odds() })
     }
 
     /// Tests all additions at once: the largest score against those under flipped signs.

@@ -90,7 +90,9 @@ impl Judge<'_> {
     fn without_outdone_names(&self, judged: Judged) -> Result<Judged, DiscoverError> {
         let Self { prepared, search, equivalent, .. } = *self;
         let (names, grown) = (self.named(&judged.confirmed), &judged.confirmed.grown);
-        if names.is_empty() || search.options.rule != Rule::Protocol {
+        // Where no class would gain anything beside the names, neither would a draft.
+        let may_lose = !names.is_empty() && judged.left.is_much();
+        if !may_lose || search.options.rule != Rule::Protocol {
             return Ok(judged);
         }
         let given_up = |names: &[&'static str]| -> Vec<GivenUp> {
