@@ -412,7 +412,7 @@ discovery-slice:
     target/dist/tactus-bench evidence run --size slice --check \
         --work target/evidence/slice/work --labels target/evidence/slice/labels
 
-# Tests of discovery that CI is too short for: drafts of further physics, a refuted draft, two parts of a measured run.
+# Tests of discovery that CI is too short for: drafts of further physics, names that a draft outdoes, a refuted draft, two parts of a measured run.
 long-tests: build
     cargo test --workspace --lib --test e2e -- --ignored drafting:: discover::
 

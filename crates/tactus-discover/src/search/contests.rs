@@ -124,11 +124,8 @@ impl Search<'_> {
         let lost: Vec<&'static str> =
             contests.iter().filter(|contest| !contest.kept).map(|contest| contest.effect).collect();
         if !lost.is_empty() {
-            let mut firm = formed.at.parameters.clone();
-            for name in lost {
-                equivalent.remove(name);
-                firm = without(&firm, name, self.known_terms);
-            }
+            equivalent.retain(|name, _| !lost.contains(name));
+            let firm = without(&formed.at.parameters, &lost, self.known_terms);
             formed.at = self.problem.fit_from(firm, POLISH_ROUNDS)?;
         }
         Ok((formed, contests))

@@ -297,7 +297,8 @@ impl Search<'_> {
         };
         let names = self.candidates.iter().map(|candidate| candidate.definition.name);
         let probabilities = names.map(|name| (name, probability(name))).collect();
-        Ok(Left { p_value, probabilities, ln_odds: pass.most_ln_odds() })
+        let ln_odds = gains.first().map_or(f64::NEG_INFINITY, |(_, gain)| gain.ln_odds);
+        Ok(Left { p_value, probabilities, ln_odds })
     }
 
     /// Tests all additions at once: the largest score against those under flipped signs.
@@ -598,13 +599,13 @@ pub(crate) fn names(parameters: &Parameters, known_terms: usize) -> Vec<&'static
     names
 }
 
-/// A model without the added terms of an effect.
-pub(crate) fn without(parameters: &Parameters, name: &str, known_terms: usize) -> Parameters {
+/// A model without the added terms of some effects.
+pub(crate) fn without(parameters: &Parameters, names: &[&str], known_terms: usize) -> Parameters {
     let mut less = parameters.clone();
     let mut index = 0;
     less.terms.retain(|term| {
         index += 1;
-        index <= known_terms || term.definition.name != name
+        index <= known_terms || !names.contains(&term.definition.name)
     });
     less
 }

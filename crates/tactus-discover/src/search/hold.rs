@@ -50,7 +50,7 @@ impl Search<'_> {
             self.reporter.enter(Stage::Withdrawing, "withdrawing each name");
             let without = |name: &&'static str| {
                 self.reporter.tell(&format!("without {name}"));
-                let less = without(&grown.at.parameters, name, self.known_terms);
+                let less = without(&grown.at.parameters, &[*name], self.known_terms);
                 self.fitted(grown, less, TRIAL_ROUNDS)
             };
             let lesses: Vec<Fitted> =
@@ -199,16 +199,12 @@ impl Search<'_> {
         self.added(at, name).any(|term| term.definition.acts_by.contains(&covariate))
     }
 
-    /// A model with one of its names only.
-    pub(crate) fn with_one_name(&self, at: &Fitted, name: &str) -> Result<Fitted, DiscoverError> {
-        let names = names(&at.parameters, self.known_terms);
-        let others: Vec<&str> = names.into_iter().filter(|other| *other != name).collect();
-        if others.is_empty() {
+    /// A model without some of its names, fitted again.
+    pub(crate) fn fitted_without(&self, at: &Fitted, names: &[&str]) -> Result<Fitted, DiscoverError> {
+        if names.is_empty() {
             return Ok(at.clone());
         }
-        let only =
-            others.iter().fold(at.parameters.clone(), |less, other| without(&less, other, self.known_terms));
-        self.problem.fit_from(only, POLISH_ROUNDS)
+        self.problem.fit_from(without(&at.parameters, names, self.known_terms), POLISH_ROUNDS)
     }
 
     /// True if a name of a grown model explains little beside a draft that was made without any.

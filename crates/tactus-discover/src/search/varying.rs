@@ -51,7 +51,7 @@ pub(super) fn varying<'a>(
     // A wire is right or wrong.
     let names = names(&at.parameters, known_terms).into_iter().filter(|name| *name != MISWIRED);
     let of_effect = |name: &'static str| {
-        let less = without(&at.parameters, name, known_terms);
+        let less = without(&at.parameters, &[name], known_terms);
         let rivals = NAMES.iter().filter(move |(effect, _)| *effect == name).flat_map(|(_, rivals)| rivals);
         let with_factors: Vec<_> = rivals.zip(&factors).filter(|(_, factors)| !factors.is_empty()).collect();
         with_factors.into_iter().map(move |(rival, factors)| Rival::alone(rival, columns(&less, factors)))

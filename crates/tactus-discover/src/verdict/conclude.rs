@@ -371,9 +371,7 @@ impl Search<'_> {
                 (true, _) => grown_rms_counts,
                 (false, Some(step)) => step.heldout_rms_before_counts,
                 (false, None) => {
-                    let part = later
-                        .iter()
-                        .fold(grown.parameters.clone(), |part, name| without(&part, name, self.known_terms));
+                    let part = without(&grown.parameters, later, self.known_terms);
                     let fitted = self.problem.fit_from(part, POLISH_ROUNDS)?;
                     self.problem.heldout_rms_counts(&fitted.predicted)
                 }

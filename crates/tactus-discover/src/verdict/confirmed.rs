@@ -91,9 +91,7 @@ impl Confirmed {
         search: &Search<'_>,
         equivalent: &Equivalent,
     ) -> Result<Self, DiscoverError> {
-        let less = gone
-            .iter()
-            .fold(self.grown.parameters.clone(), |less, name| without(&less, name, search.known_terms));
+        let less = without(&self.grown.parameters, gone, search.known_terms);
         let grown = if prepared.base.parameters.has_terms_like(&less) {
             prepared.base.clone()
         } else {
@@ -137,7 +135,7 @@ impl Search<'_> {
         let mut steps = Vec::new();
         for name in names {
             let problem = if name == MISWIRED { with_silent } else { self.problem };
-            let less = without(&grown.parameters, name, known_terms);
+            let less = without(&grown.parameters, &[name], known_terms);
             let held = equivalent.get(name).map(|alike| &alike.without);
             let before = match held.filter(|held| held.parameters.has_terms_like(&less)) {
                 Some(held) => held.clone(),

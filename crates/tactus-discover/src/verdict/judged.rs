@@ -110,7 +110,8 @@ impl Judge<'_> {
         let acts_alike = |name: &&str| search.acts_by(grown, name, alone.draft.covariates[0]);
         let alike: Vec<&str> = names.iter().copied().filter(acts_alike).collect();
         if let [name] = alike[..] {
-            let only = search.with_one_name(grown, name)?;
+            let others: Vec<&str> = names.iter().copied().filter(|other| *other != name).collect();
+            let only = search.fitted_without(grown, &others)?;
             if base.cost - only.cost > BETTER_PART * (base.cost - alone.at.cost) {
                 return Ok(judged);
             }
@@ -124,10 +125,13 @@ impl Judge<'_> {
         if gone.len() == names.len() {
             return Ok(nameless);
         }
+        if gone.is_empty() {
+            return Ok(judged);
+        }
         let less = judged.confirmed.without(&gone, prepared, search, equivalent)?;
         let less = self.judge(less, given_up(&gone), None)?;
         let is_there = matches!(&less.draft, Some(Ok(beside)) if beside.is_like(alone));
-        Ok(if is_there && !gone.is_empty() { less } else { judged })
+        Ok(if is_there { less } else { judged })
     }
 
     /// The model without the names that leave more of the gap than an effect leaves of its own physics. They come nearest, and are tentative; a

@@ -157,7 +157,7 @@ fn law(draft: &Draft) -> String {
     format!("{}: {}", draft.law.name(), numbers.collect::<Vec<_>>().join(", "))
 }
 
-/// What an effect of the library is a function of.
+/// Covariates by which an effect of the library shows.
 fn acts_by(known: &Definition) -> Vec<&'static str> {
     known.acts_by.iter().map(|covariate| covariate.name()).collect()
 }
