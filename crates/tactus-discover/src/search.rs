@@ -48,9 +48,14 @@
 //! | draft.rs | `FOLDS_LEAST` | `4` | convention | all but one |
 //! | draft/curves.rs | `SHAPES` | `60` | cost | a step of a grid; refined after |
 //! | draft/curves.rs | `FREE_COST` | `1.0` | convention | half a nat |
+//! | draft/curves.rs | `SAME_COST` | `1e-6` | convention | rounding |
 //! | draft/curves.rs | `HELD` | `1e3` | convention | holds a mean and leaves the sum regular |
 //! | draft/curves.rs | `RIDGE` | `1e-9` | convention | keeps 0 what the data do not show |
 //! | draft/curves.rs | `REFINEMENTS` | `8` | derived | `2^-8` of a step |
+//! | draft/form.rs | `MISSED_SHARE` | `0.01 / 3.0` | derived | a curve within 10 % has a hundredth of the squares beside it, which three choices share (decision 0061) |
+//! | draft/form.rs | `MISSED_LN_ODDS` | `5.0` | convention | `LN_ODDS_LEAST` |
+//! | draft/form.rs | `FINER` | `[2, 4]` | cost | 14 and 28 knots |
+//! | draft/form.rs | `FINER_OF_SECOND` | `2` | cost | 8 knots |
 //! | draft/grammar.rs | `JUMP_SHARE` | `1.0 / jumps::CELLS as f64` | derived | a cell of those among which it was found |
 //! | draft/sight.rs | `LOUD_SHARE` | `0.02` | convention | readings without a signal place no knots |
 //! | draft/sight.rs | `APART_SHARE` | `0.01` | convention | nearer knots see the same |
@@ -111,6 +116,7 @@
 //! | score.rs | `PANEL` | `256` | cost | the cache of a processor |
 //! | tones.rs | `CELLS` | `8192` | cost | of a transform |
 //! | tones.rs | `FINER` | `4` | derived | so that no tone lies between two frequencies |
+//! | tones.rs | `HALVINGS` | `8` | derived | a thousandth of a period over all the data |
 //! | tones.rs | `PERIODS_LEAST` | `3` | convention | slower is a smooth function |
 //! | tones.rs | `CELLS_LEAST` | `4` | derived | a tone of two cells is none |
 //! | tones.rs | `STEPS_LEAST` | `2.0` | derived | the codes of a converter show nothing shorter (decision 0048) |

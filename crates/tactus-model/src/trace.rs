@@ -37,6 +37,8 @@ pub struct Trace {
     pub travel_mm: f64,
     /// Direction of the last sideways move along x and y: -1, 0 or 1.
     pub aside: [f64; 2],
+    /// Direction of that move as a vector of length 1; 0 before the first.
+    pub heading: [f64; 2],
     /// Number of contacts so far.
     pub presses: f64,
     /// Largest depth in earlier contacts.
@@ -138,6 +140,10 @@ impl Trace {
         let is_moving = moved_mm > STILL_MM_PER_S * dt_s;
         if self.is_moving != is_moving {
             (self.is_moving, self.turn_s) = (is_moving, t_s);
+        }
+        let along_mm = aside[0].hypot(aside[1]);
+        if along_mm > ASIDE_MM_PER_S * dt_s {
+            self.heading = aside.map(|moved| moved / along_mm);
         }
         for (held, moved) in self.aside.iter_mut().zip(aside) {
             if moved.abs() > ASIDE_MM_PER_S * dt_s {
@@ -281,8 +287,8 @@ impl Covariate {
                 x.hypot(y)
             }
             Self::Ahead => {
-                let ([x, y], [along_x, along_y]) = (seen.offset_mm(element)?, trace.aside);
-                (x * along_x + y * along_y) / along_x.hypot(along_y).max(1.0)
+                let ([x, y], [along_x, along_y]) = (seen.offset_mm(element)?, trace.heading);
+                x * along_x + y * along_y
             }
             Self::Counts => *seen.counts.get(element)?,
         })

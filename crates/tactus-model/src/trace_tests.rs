@@ -60,6 +60,18 @@ fn distances_are_from_the_tip_to_the_elements() {
     assert_eq!(Covariate::Counts.value(seen, 20), None, "the counts are not known yet");
 }
 
+/// A stage that goes both ways at once goes along neither axis, nor between them.
+#[test]
+fn what_is_ahead_lies_along_the_way_the_tip_came() {
+    let (mut trace, array) = (pressed(), Array::digitacts());
+    trace.take(3.0, [5.0, 7.0], -0.1, None);
+    trace.take(4.0, [5.0, 7.0], 0.3, None);
+    let [x, y] = array.centre_mm(20).unwrap();
+    let seen = Seen { trace: &trace, array: &array, signal_mm: &[], counts: &[] };
+    assert!(near(Covariate::Ahead.value(seen, 20), 0.6 * (x - 5.0) + 0.8 * (y - 7.0)));
+    assert!(near(value(Covariate::ApproachX, &trace), 1.0) && near(value(Covariate::ApproachY, &trace), 1.0));
+}
+
 #[test]
 fn the_rate_of_frames_does_not_change_what_is_seen() {
     // The same press at 30 Hz and at 1 kHz.

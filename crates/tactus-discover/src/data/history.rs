@@ -19,6 +19,8 @@ pub(crate) struct History {
     pub(crate) speed_mm_per_s: Vec<f64>,
     pub(crate) travel_mm_per_s: Vec<f64>,
     pub(crate) aside: [Vec<f64>; 2],
+    /// Direction of the last move aside, of length 1.
+    pub(crate) heading: Vec<[f64; 2]>,
     pub(crate) press: Vec<f64>,
     pub(crate) place_mm: [Vec<f64>; 2],
     pub(crate) last_place_mm: Vec<Option<[f64; 2]>>,
@@ -40,6 +42,7 @@ impl History {
             speed_mm_per_s: empty(),
             travel_mm_per_s: empty(),
             aside: [empty(), empty()],
+            heading: Vec::with_capacity(count),
             press: empty(),
             place_mm: [empty(), empty()],
             last_place_mm: Vec::with_capacity(count),
@@ -69,6 +72,7 @@ impl History {
             history.travel_mm_per_s.push(state.travel_mm_per_s);
             history.aside[0].push(state.aside[0]);
             history.aside[1].push(state.aside[1]);
+            history.heading.push(state.heading);
             history.press.push(state.presses);
             history.place_mm[0].push(frames.position_mm[frame][0]);
             history.place_mm[1].push(frames.position_mm[frame][1]);
@@ -92,6 +96,7 @@ struct SensorHistory {
     speed_mm_per_s: f64,
     travel_mm_per_s: f64,
     aside: [f64; 2],
+    heading: [f64; 2],
     presses: f64,
     press: Option<i32>,
     deepest_mm: f64,
@@ -118,6 +123,9 @@ impl SensorHistory {
             self.travel_mm_per_s = moved_mm / dt_s;
             if self.moves != (moved_mm > 1e-3) {
                 (self.moves, self.turn_s) = (!self.moves, t_s);
+            }
+            if far > ASIDE_MM {
+                self.heading = aside.map(|moved| moved / far);
             }
             for (held, moved) in self.aside.iter_mut().zip(aside) {
                 if moved.abs() > ASIDE_MM.min(far) && moved.abs() > 1e-3 {

@@ -1,7 +1,7 @@
 //! Lines in the spectrum of the residual, such as interference from the mains.
 //!
-//! Only frames without contact are used. The presses interrupt them, so slow changes also have lines at the rhythm of the
-//! presses. Lines at which this rhythm itself has one are ignored.
+//! Frames without contact are used, or those of the tip at rest in contact. The presses interrupt both, so slow changes also have lines at the
+//! rhythm of the presses. Lines at which this rhythm itself has one are ignored.
 //!
 //! A tone is looked for in two ways. What all elements have together, from column to column a phase later, stands out of the sum
 //! over elements by their number, so that a tone far below the noise of an element is seen: for each of some phases the columns are summed
@@ -13,7 +13,7 @@ use std::ops::Range;
 use tactus_model::effect::{By, Table};
 
 use super::frames::Frames;
-use super::motion::interval_s;
+use super::motion::{interval_s, still};
 use crate::numbers::{NORMAL_PER_MEDIAN, median};
 
 /// Least height of a line of the summed powers above the surrounding ones, in units of their scatter. The sum over elements with
@@ -55,13 +55,13 @@ struct Peak {
 ///
 /// `residual`: frame by frame, element by element, of an array with so many columns.
 pub(crate) fn lines(frames: &Frames, columns: usize, residual: &[f64]) -> Vec<Line> {
-    let Some(idle) = Idle::of(frames) else { return Vec::new() };
-    let elements = frames.elements;
+    let Some(idle) = Chosen::of(frames, |frame| frames.position_mm[frame][2] > 0.0) else {
+        return Vec::new();
+    };
     let mut power = vec![0.0; idle.size / 2];
     let mut sums = vec![vec![0.0; idle.frames.len()]; columns];
-    for element in 0..elements {
-        let mut values: Vec<f64> =
-            idle.frames.iter().map(|frame| residual[frame * elements + element]).collect();
+    for element in 0..frames.elements {
+        let mut values = idle.of_element(element, frames.elements, residual);
         idle.take_off_drift(&mut values);
         for (value, sum) in values.iter().zip(&mut sums[element % columns]) {
             *sum += value;
@@ -70,27 +70,28 @@ pub(crate) fn lines(frames: &Frames, columns: usize, residual: &[f64]) -> Vec<Li
             *power += squared(of_element);
         }
     }
-    let rhythm: Vec<f64> = idle.spectrum(&vec![1.0; idle.frames.len()]).into_iter().map(squared).collect();
     let of_powers = |at: usize| clearness(power[at], &power[around(at, AROUND, power.len())]) / STANDS_OUT;
-    let mut peaks = idle.peaks(&power, &rhythm, 0.0, of_powers);
-    // What all elements have from stretch to stretch leaks far.
-    for sum in &mut sums {
-        idle.take_off_means(sum);
+    let mut peaks = idle.peaks(&power, &idle.rhythm(), 0.0, of_powers);
+    peaks.extend(idle.of_columns(sums));
+    clearest(peaks)
+}
+
+/// Lines in the residual of the frames in which the tip rests in contact, clearest first, as the sums of columns tell them: there all elements
+/// have much together, so that the scatter of their powers tells nothing.
+pub(crate) fn lines_in_contact(frames: &Frames, columns: usize, residual: &[f64]) -> Vec<Line> {
+    let still = still(frames);
+    let rests = |frame: usize| frames.position_mm[frame][2] <= 0.0 && still[frame] > 0;
+    let Some(resting) = Chosen::of(frames, rests) else { return Vec::new() };
+    let mut sums = vec![vec![0.0; resting.frames.len()]; columns];
+    for element in 0..frames.elements {
+        let values = resting.of_element(element, frames.elements, residual);
+        sums[element % columns].iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
     }
-    let of_columns: Vec<Vec<[f64; 2]>> = sums.iter().map(|sum| idle.spectrum(sum)).collect();
-    let phases = PHASES_PER_COLUMN * columns;
-    let nats = (idle.size as f64 / 2.0 * phases as f64 * RECORDINGS_PER_FALSE_LINE).ln();
-    for phase in 0..phases {
-        let phase = TAU * (phase as f64 / phases as f64 - 0.5);
-        let together = summed(&of_columns, phase);
-        // The power of noise is distributed exponentially, with a median of ln 2 of the mean.
-        // Near a slope the nearest tell it best; elsewhere a median of few scatters too much.
-        let of_sum = |at: usize| {
-            let middle = |reach| median(&together[around(at, reach, together.len())]);
-            LN_2 * together[at] / middle(AROUND).max(middle(FAR_AROUND)).max(f64::MIN_POSITIVE) / nats
-        };
-        peaks.extend(idle.peaks(&together, &rhythm, phase.to_degrees(), of_sum));
-    }
+    clearest(resting.of_columns(sums))
+}
+
+/// The clearest of some peaks that are not neighbours.
+fn clearest(mut peaks: Vec<Peak>) -> Vec<Line> {
     peaks.sort_by(|a, b| b.clearness.total_cmp(&a.clearness));
     let mut clearest: Vec<Peak> = Vec::new();
     for peak in peaks {
@@ -101,8 +102,8 @@ pub(crate) fn lines(frames: &Frames, columns: usize, residual: &[f64]) -> Vec<Li
     clearest.into_iter().map(|peak| peak.line).collect()
 }
 
-/// The frames without contact of the longest run, in slots of a frame's time.
-struct Idle {
+/// Some frames of the longest run, in slots of a frame's time.
+struct Chosen {
     frames: Vec<usize>,
     /// The slot of each.
     slots: Vec<usize>,
@@ -113,9 +114,9 @@ struct Idle {
     first: usize,
 }
 
-impl Idle {
+impl Chosen {
     /// `None` where a run is too short for a spectrum.
-    fn of(frames: &Frames) -> Option<Self> {
+    fn of(frames: &Frames, is_chosen: impl Fn(usize) -> bool) -> Option<Self> {
         let interval_s = interval_s(frames);
         let mut begin = 0;
         let mut longest = (0, 0);
@@ -140,8 +141,8 @@ impl Idle {
             slot
         };
         let size = (slot(end - 1) + 1).next_power_of_two().min(1 << 18);
-        let is_idle = |frame: &usize| frames.position_mm[*frame][2] > 0.0 && slot(*frame) < size;
-        let idle: Vec<usize> = (begin..end).filter(is_idle).collect();
+        let chosen: Vec<usize> =
+            (begin..end).filter(|frame| slot(*frame) < size && is_chosen(*frame)).collect();
         let step_hz = 1.0 / (size as f64 * interval_s);
         #[expect(
             clippy::cast_possible_truncation,
@@ -150,12 +151,46 @@ impl Idle {
         )]
         let first = ((PERIODS_LEAST / duration_s / step_hz) as usize).max(2);
         Some(Self {
-            slots: idle.iter().map(|frame| slot(*frame)).collect(),
-            frames: idle,
+            slots: chosen.iter().map(|frame| slot(*frame)).collect(),
+            frames: chosen,
             size,
             step_hz,
             first,
         })
+    }
+
+    /// What an element has in these frames.
+    fn of_element(&self, element: usize, elements: usize, residual: &[f64]) -> Vec<f64> {
+        self.frames.iter().map(|frame| residual[frame * elements + element]).collect()
+    }
+
+    /// The power of the times at which there are frames.
+    fn rhythm(&self) -> Vec<f64> {
+        self.spectrum(&vec![1.0; self.frames.len()]).into_iter().map(squared).collect()
+    }
+
+    /// Peaks of the sums of columns, each a phase further than the one before.
+    fn of_columns(&self, mut sums: Vec<Vec<f64>>) -> Vec<Peak> {
+        // What all elements have from stretch to stretch leaks far.
+        for sum in &mut sums {
+            self.take_off_means(sum);
+        }
+        let rhythm = self.rhythm();
+        let of_columns: Vec<Vec<[f64; 2]>> = sums.iter().map(|sum| self.spectrum(sum)).collect();
+        let phases = PHASES_PER_COLUMN * sums.len();
+        let nats = (self.size as f64 / 2.0 * phases as f64 * RECORDINGS_PER_FALSE_LINE).ln();
+        let of_phase = |phase: usize| {
+            let phase = TAU * (phase as f64 / phases as f64 - 0.5);
+            let together = summed(&of_columns, phase);
+            // The power of noise is distributed exponentially, with a median of ln 2 of the mean.
+            // Near a slope the nearest tell it best; elsewhere a median of few scatters too much.
+            let of_sum = |at: usize| {
+                let middle = |reach| median(&together[around(at, reach, together.len())]);
+                LN_2 * together[at] / middle(AROUND).max(middle(FAR_AROUND)).max(f64::MIN_POSITIVE) / nats
+            };
+            self.peaks(&together, &rhythm, phase.to_degrees(), of_sum)
+        };
+        (0..phases).flat_map(of_phase).collect()
     }
 
     /// Takes a slow drift off: straight lines between the medians of some parts, of which each has a period of the slowest tone at least. The

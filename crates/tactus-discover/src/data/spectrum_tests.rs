@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tactus_schema::table::{Phase, RowView};
 
-use super::{Line, lines, transform};
+use super::{Line, lines, lines_in_contact, transform};
 use crate::data::Frames;
 
 const ELEMENTS: usize = 16;
@@ -35,6 +35,11 @@ fn pressed(frames_of_presses: impl Iterator<Item = usize>) -> Frames {
         }
     }
     frames
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousands")]
+fn frame_at(t_s: f64) -> usize {
+    (t_s * RATE_HZ).round() as usize
 }
 
 /// A residual of noise with a standard deviation of 1, plus `upon` at each time in s and element.
@@ -88,6 +93,48 @@ fn a_faint_tone_of_all_elements_is_found_with_its_phase() {
         };
         assert!((frequency_hz - 7.3).abs() < 0.01, "{frequency_hz}");
         assert!((found_deg - phase_per_column_deg).abs() < 1e-9, "{found_deg} for {phase_per_column_deg}");
+    }
+}
+
+/// The stage carries the mains into the array: it shows while the tool touches, and nowhere else.
+#[test]
+fn a_tone_in_contact_is_found_in_contact_alone() {
+    let mut rng = ChaCha8Rng::seed_from_u64(15);
+    let lengths: Vec<usize> = (0..140).map(|_| rng.random_range(20..60)).collect();
+    let frames = pressed(lengths.into_iter());
+    for hz in [1.3, 4.7, 11.2] {
+        let touches = |t_s: f64| frames.position_mm[frame_at(t_s)][2] < 0.0;
+        let tone = |t_s: f64, _| if touches(t_s) { 0.35 * (TAU * hz * t_s).sin() } else { 0.0 };
+        let residual = residual(&frames, &mut rng, tone);
+        let found = lines_in_contact(&frames, COLUMNS, &residual);
+        assert!(found.first().is_some_and(|line| (line.frequency_hz - hz).abs() < 0.01), "{hz}: {found:?}");
+        assert!(lines(&frames, COLUMNS, &residual).is_empty(), "{hz}");
+    }
+}
+
+/// What a press relaxes by is alike from press to press, and no tone; nor is noise.
+#[test]
+fn presses_that_relax_have_no_lines() {
+    let mut rng = ChaCha8Rng::seed_from_u64(16);
+    let lengths: Vec<usize> = (0..140).map(|_| rng.random_range(20..60)).collect();
+    let frames = pressed(lengths.into_iter());
+    let since: Vec<f64> = {
+        let mut begin = 0;
+        let is_down = |frame: usize| frames.position_mm[frame][2] < 0.0;
+        let of = |frame: usize| {
+            if frame > 0 && is_down(frame) != is_down(frame - 1) {
+                begin = frame;
+            }
+            (frame - begin) as f64 / RATE_HZ
+        };
+        (0..frames.len()).map(of).collect()
+    };
+    for relaxes_by in [0.0, 3.0] {
+        let left = |t_s: f64, _| relaxes_by * (-since[frame_at(t_s)] / 0.3).exp();
+        let with_lines = (0..20)
+            .filter(|_| !lines_in_contact(&frames, COLUMNS, &residual(&frames, &mut rng, left)).is_empty());
+        let with_lines = with_lines.count();
+        assert!(with_lines <= 2, "{with_lines} of 20 that relax by {relaxes_by}");
     }
 }
 

@@ -102,8 +102,9 @@ impl<'a> Prepared<'a> {
             recalibrated(&Problem::new(Predictor::with_images(known, frames, bins, &images), &noise), &faulty)
         };
         let mut base = base_of(&bins)?;
-        let lines = lines(&Predictor::with_images(known, frames, &whole, &images), &base, &faulty)?;
-        if !lines.is_empty() {
+        let [lines, in_contact] =
+            lines(&Predictor::with_images(known, frames, &whole, &images), &base, &faulty)?;
+        if !lines.is_empty() || !in_contact.is_empty() {
             // Averaging over several frames would remove a tone.
             bins = Bins::of(frames, false)?;
             bins.weigh(frames, &noise, &heldout);
@@ -178,13 +179,15 @@ fn recalibrated(problem: &Problem<'_>, faulty: &Faulty) -> Result<Fitted, Discov
     problem.fit_from(start, BASE_ROUNDS)
 }
 
-/// Lines in the spectrum of a model's residual of all frames.
-fn lines(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<Vec<Line>, DiscoverError> {
+/// Lines in the spectrum of a model's residual of all frames without contact, and of those in which the tip rests in contact.
+fn lines(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<[Vec<Line>; 2], DiscoverError> {
     let predicted = whole.predict(&base.parameters)?;
     let mut residual: Vec<f64> =
         whole.frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
     for element in (0..whole.frames.elements).filter(|element| faulty.is_weightless(*element)) {
         residual.iter_mut().skip(element).step_by(whole.frames.elements).for_each(|residual| *residual = 0.0);
     }
-    Ok(spectrum::lines(whole.frames, whole.known.array.cols(), &residual))
+    let columns = whole.known.array.cols();
+    let without_contact = spectrum::lines(whole.frames, columns, &residual);
+    Ok([without_contact, spectrum::lines_in_contact(whole.frames, columns, &residual)])
 }

@@ -3,8 +3,8 @@
 //! A draft is a [`tactus_model::effect::Draft`]: a carrier, when it acts, a curve of one covariate or two, and a weight for each element or
 //! none. The [`grammar`] lists them. At a model, one pass gives the products of all with the residual, knot by knot of their curves, and a
 //! test by flipped signs says whether noise would give as much to any of them. A second pass weighs those that come first by their
-//! evidence, as classes are weighed. The best one is then tried with a second covariate. Its curve becomes a law, if one passes through its
-//! knots ([`curves`]), and is fitted once more as the effect that the draft is.
+//! evidence, as classes are weighed. The best one gets its form ([`form`]): knots, weights of the elements, a second covariate, and a law if one
+//! passes through its curve ([`curves`]); and is fitted once more as the effect that the draft is.
 //!
 //! The columns are those of the draft itself: a constant draft gives what one unit of each carrier does, and the covariates are those that
 //! the draft will see in a simulation ([`sight`]).
@@ -12,21 +12,22 @@
 //! Held-out presses take no part.
 
 mod curves;
+mod form;
 mod grammar;
 mod sight;
 mod words;
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
-use tactus_model::effect::{Carrier, Draft, PipelineStage};
+use nalgebra::DMatrix;
+use tactus_model::effect::{Draft, PipelineStage};
 
+use self::form::AsEffect;
 use self::grammar::Atom;
 use self::sight::Sight;
-use super::evidence::{Addition, Evidence, Gain, Signs, excused};
-use super::grow::{ALPHA, FLIPS, POLISH_ROUNDS, Search};
+use super::evidence::{Addition, Evidence, Gain, Signs};
+use super::grow::{FLIPS, Search};
 use super::score::{Score, flipped, largest, p_value};
 use crate::data::DiscoverError;
 use crate::fit::{FOLDS, Fitted, Free, Grams, Term};
@@ -164,15 +165,6 @@ pub(crate) enum Against<'a> {
 /// The outcome of drafting.
 pub(crate) type Outcome = Result<Box<Drafted>, NoDraft>;
 
-/// A draft as an effect, fitted.
-struct AsEffect {
-    draft: Draft,
-    at: Fitted,
-    covariance: Vec<Vec<f64>>,
-    knots: Vec<[f64; 3]>,
-    unseen_gains: Vec<f64>,
-}
-
 /// An atom with its columns in one of the passes that test each column by itself.
 struct Screened<'a> {
     atom: &'a Atom,
@@ -200,16 +192,14 @@ struct Field<'a> {
 }
 
 impl Field<'_> {
-    /// Of those that are as good as the first the one with the fewest numbers.
-    fn best(&self) -> Option<(usize, f64)> {
-        let as_good = as_good_as_first(&self.ranked);
-        as_good.into_iter().min_by_key(|(one, _)| self.weighed[*one].directions.len())
+    /// Those that are as good as the first.
+    fn as_good(&self) -> Vec<(usize, f64)> {
+        as_good_as_first(&self.ranked)
     }
 
     /// Those that are as good and act on something else or by something else, in words.
     fn alike(&self, best: usize) -> Vec<String> {
-        let as_good = as_good_as_first(&self.ranked);
-        let others = as_good.into_iter().filter(|(one, _)| !self.is_like(*one, best));
+        let others = self.as_good().into_iter().filter(|(one, _)| !self.is_like(*one, best));
         let mut words: Vec<String> = others.map(|(one, _)| words::of_atom(&self.weighed[one].atom)).collect();
         words.dedup();
         words
@@ -228,11 +218,13 @@ impl Field<'_> {
 
 impl Search<'_> {
     /// Drafts what a model leaves, as an effect of this name. If what comes first is no draft, that which comes next is tried, as if the first
-    /// were not in the grammar. If what comes first acts at one of the `closed` stages, there is none.
+    /// were not in the grammar. If noise would give as much to any draft with a probability above `alpha`, or what comes first acts at one of the
+    /// `closed` stages, there is none.
     pub(crate) fn draft(
         &self,
         at: &Fitted,
         name: &str,
+        alpha: f64,
         against: Against<'_>,
         closed: &[PipelineStage],
     ) -> Result<Outcome, DiscoverError> {
@@ -240,7 +232,7 @@ impl Search<'_> {
         self.reporter.enter(Stage::Drafting, "drafting what nobody has named");
         let atoms = grammar::atoms(self.problem, at, &sight, self.rounds);
         let (p_value, first) = self.screened(at, &sight, &atoms)?;
-        if p_value > ALPHA {
+        if p_value > alpha {
             return Ok(Err(NoDraft::Noise));
         }
         let (weighed, grams) = self.products(at, &sight, first)?;
@@ -255,7 +247,7 @@ impl Search<'_> {
         };
         let mut why = NoDraft::NoGain;
         for nth in 0..TRIED_MAX {
-            let Some((best, ln_odds)) = field.best() else { break };
+            let Some((best, ln_odds)) = self.best(at, &sight, &field)? else { break };
             let Atom { carrier, covariates, .. } = &field.weighed[best].atom;
             if closed.contains(&carrier.stage(covariates)) {
                 return Ok(Err(NoDraft::OfAName));
@@ -268,6 +260,28 @@ impl Search<'_> {
             field.leave_out(best);
         }
         Ok(Err(why))
+    }
+
+    /// Of the atoms that are as good as the first those that are best with as many knots as the evidence carries, and of those that act on the
+    /// same by the same the one with the fewest numbers.
+    fn best(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        field: &Field<'_>,
+    ) -> Result<Option<(usize, f64)>, DiscoverError> {
+        let mut as_good = field.as_good();
+        let Some((first, _)) = as_good.first().copied() else { return Ok(None) };
+        if as_good.iter().any(|(one, _)| !field.is_like(*one, first)) {
+            let fine = |one: usize| form::finer(&field.weighed[one].atom, sight);
+            let (of, atoms): (Vec<usize>, Vec<Atom>) =
+                as_good.iter().flat_map(|(one, _)| fine(*one).into_iter().map(|atom| (*one, atom))).unzip();
+            let (weighed, grams) = self.products(at, sight, atoms)?;
+            let additions = additions(&weighed, &grams, field.count);
+            let ranked = ranked(&self.evidence_of(&additions, grams.reduced()));
+            as_good.retain(|(one, _)| ranked.first().is_none_or(|(best, _)| field.is_like(*one, of[*best])));
+        }
+        Ok(as_good.into_iter().min_by_key(|(one, _)| field.weighed[*one].directions.len()))
     }
 
     /// The best atom of a field as a draft.
@@ -289,9 +303,9 @@ impl Search<'_> {
         if let (Some((class, _)), Against::Classes { .. }) = (as_near, against) {
             return Ok(Err(NoDraft::Class(class)));
         }
-        let atom = self.with_second(at, sight, &field.weighed[best].atom, ln_odds, field.count)?;
+        let atom = field.weighed[best].atom.clone();
         let Some(AsEffect { draft, at: with, covariance, knots, unseen_gains }) =
-            self.as_effect(at, sight, atom, name)?
+            self.as_effect(at, sight, atom, field.count, name)?
         else {
             return Ok(Err(NoDraft::NoGain));
         };
@@ -424,140 +438,6 @@ impl Search<'_> {
         Ok(best.iter().map(of).filter(|(class, _)| !is_refuted(class)).take(3).collect())
     }
 
-    /// The atom with a second covariate, if one gains more than a form is excused for; else as it is.
-    fn with_second(
-        &self,
-        at: &Fitted,
-        sight: &Arc<Sight>,
-        best: &Atom,
-        ln_odds: f64,
-        count: f64,
-    ) -> Result<Atom, DiscoverError> {
-        let seconds: Vec<Atom> = grammar::with_seconds(best, sight).collect();
-        let mut found = (ln_odds + excused(ln_odds), best.clone());
-        let each = seconds.first().map_or(1, |second| second.columns(sight.elements));
-        for some in seconds.chunks((COLUMNS_MAX / each).max(1)) {
-            let (weighed, grams) = self.products(at, sight, some.to_vec())?;
-            let additions = additions(&weighed, &grams, count * seconds.len() as f64);
-            let first = ranked(&self.evidence_of(&additions, grams.reduced())).into_iter().next();
-            if let Some((place, of_both)) = first.filter(|(_, of_both)| *of_both > found.0) {
-                found = (of_both, weighed[place].atom.clone());
-            }
-        }
-        Ok(found.1)
-    }
-
-    /// The atom's curve, as a law or a table, fitted as an effect; `None` if it gains nothing.
-    fn as_effect(
-        &self,
-        at: &Fitted,
-        sight: &Arc<Sight>,
-        atom: Atom,
-        name: &str,
-    ) -> Result<Option<AsEffect>, DiscoverError> {
-        let mut atom = if atom.of_elements { self.with_weights(at, sight, atom)? } else { atom };
-        let mut curve = self.curve(at, sight, &atom)?;
-        if let Some(weights) = self.weights_beside(at, sight, &atom, &curve)? {
-            atom = Atom { weights: Some(weights), ..atom };
-            curve = self.curve(at, sight, &atom)?;
-        }
-        let reduced = curves::reduced(&atom, &curve, excused(0.5 * curve.squares()));
-        let draft = words::named(sight, &atom, reduced.law, name);
-        Ok(self.taken(at, draft)?.map(|(draft, fitted, by)| AsEffect {
-            draft,
-            at: fitted,
-            covariance: scaled(reduced.covariance, by * by),
-            unseen_gains: curve.unseen_gains,
-            knots: reduced.knots.into_iter().map(|[at, value, error]| [at, by * value, by * error]).collect(),
-        }))
-    }
-
-    /// The coefficients of an atom's columns with the greatest posterior probability.
-    fn curve(&self, at: &Fitted, sight: &Arc<Sight>, atom: &Atom) -> Result<curves::Curve, DiscoverError> {
-        let (weighed, grams) = self.products(at, sight, vec![atom.clone()])?;
-        let additions = additions(&weighed, &grams, 1.0);
-        let evidence = self.evidence_of(&additions, grams.reduced());
-        let found: BTreeMap<usize, f64> = evidence.coefficients(&evidence.set([0])).into_iter().collect();
-        let directions = &additions[0].directions;
-        let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
-        let product = |i: usize, j: usize| grams.reduced()[(directions[i], directions[j])];
-        let of_others = |fold: usize| -> Vec<(usize, f64)> {
-            let products = grams.without(fold);
-            let evidence = self.evidence_of(&additions, &products);
-            evidence.coefficients(&evidence.set([0]))
-        };
-        let by_folds: Vec<Vec<(usize, f64)>> = (0..FOLDS).map(of_others).collect();
-        Ok(curves::Curve {
-            unseen_gains: grams.gains(|fold| &by_folds[fold]),
-            values: DVector::from_iterator(directions.len(), directions.iter().map(value)),
-            gram: DMatrix::from_fn(directions.len(), directions.len(), product) / self.problem.variance,
-        })
-    }
-
-    /// An atom of single elements with the weight of each; the largest is 1.
-    fn with_weights(&self, at: &Fitted, sight: &Arc<Sight>, atom: Atom) -> Result<Atom, DiscoverError> {
-        let weights = self.curve(at, sight, &atom)?.values;
-        let most = weights.iter().fold(f64::MIN_POSITIVE, |most: f64, one| most.max(one.abs()));
-        let weights = Arc::new(weights.iter().map(|one| one / most).collect());
-        Ok(Atom { weights: Some(weights), of_elements: false, curve: None, ..atom })
-    }
-
-    /// Weights of the elements for an atom that acts on all alike along this curve, if what differs between them gains more than a form is
-    /// excused for.
-    fn weights_beside(
-        &self,
-        at: &Fitted,
-        sight: &Arc<Sight>,
-        atom: &Atom,
-        curve: &curves::Curve,
-    ) -> Result<Option<Arc<Vec<f64>>>, DiscoverError> {
-        let may_have = matches!(atom.carrier, Carrier::Counts | Carrier::OwnSignal | Carrier::EveryElement);
-        let most = curve.values.amax();
-        let is_plain = atom.weights.is_none() && atom.per_unit.is_none() && atom.covariates.len() == 1;
-        if !(may_have && is_plain && most > 0.0) {
-            return Ok(None);
-        }
-        let shared = Arc::new(curve.values.iter().map(|value| value / most).collect());
-        let beside = Atom { of_elements: true, curve: Some(shared), ..atom.clone() };
-        let (weighed, grams) = self.products(at, sight, vec![atom.clone(), beside])?;
-        let additions = additions(&weighed, &grams, 1.0);
-        let evidence = self.evidence_of(&additions, grams.reduced());
-        let common = evidence.set([0]);
-        if evidence.gain(&common, 1).ln_odds <= excused(common.ln_odds) {
-            return Ok(None);
-        }
-        let found: BTreeMap<usize, f64> = evidence.coefficients(&evidence.set([0, 1])).into_iter().collect();
-        let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
-        let most = weighed[0]
-            .directions
-            .iter()
-            .map(value)
-            .fold(f64::MIN_POSITIVE, |most: f64, one| most.max(one.abs()));
-        let weights = weighed[1].directions.iter().map(|one| 1.0 + value(one) / most).collect();
-        Ok(Some(Arc::new(weights)))
-    }
-
-    /// The draft as a term of the model, with its law as it is fitted, so that its strength is 1; `None` if it does not come nearer to the data.
-    fn taken(&self, at: &Fitted, draft: Draft) -> Result<Option<(Draft, Fitted, f64)>, DiscoverError> {
-        let term = Term::of_draft(draft.clone().define()?);
-        let fitted = self.problem.fit_from(at.parameters.with(term), POLISH_ROUNDS)?;
-        let [along, quadrature] = fitted.parameters.terms.last().map_or([0.0; 2], Term::strength_of_draft);
-        let strength = along.hypot(quadrature);
-        if along <= 0.0 || fitted.cost >= at.cost {
-            return Ok(None);
-        }
-        let draft = Draft { law: draft.law.turned([along, quadrature]), ..draft };
-        let draft = Draft { sentence: words::sentence(&draft), ..draft };
-        // The prediction is the same: a draft is its strength times its law.
-        let mut parameters = fitted.parameters;
-        if let Some(last) = parameters.terms.last_mut() {
-            *last = Term::of_draft(draft.clone().define()?);
-        }
-        let mut errors = fitted.errors;
-        errors.last_mut().into_iter().flatten().for_each(|error| *error /= strength);
-        Ok(Some((draft, Fitted { parameters, errors, ..fitted }, strength)))
-    }
-
     /// How much of a draft, the last term of a model, is not taken up by recalibration and the other terms.
     fn own_share(&self, at: &Fitted, with: &Fitted) -> Result<f64, DiscoverError> {
         let Some(term) = with.parameters.terms.last() else { return Ok(0.0) };
@@ -566,11 +446,6 @@ impl Search<'_> {
         let grams = self.problem.grams(at, vec![direction])?;
         Ok(grams.size(0) / grams.whole(0).max(f64::MIN_POSITIVE))
     }
-}
-
-/// Rows times a factor.
-fn scaled(rows: Vec<Vec<f64>>, by: f64) -> Vec<Vec<f64>> {
-    rows.into_iter().map(|row| row.into_iter().map(|value| by * value).collect()).collect()
 }
 
 /// The atoms as additions, each a class of its own.

@@ -336,13 +336,28 @@ impl Evidence<'_> {
     pub(crate) fn coefficients(&self, set: &Set) -> Vec<(usize, f64)> {
         let count = set.swept.len();
         let last = self.products.nrows() - 1;
-        let matrix = DMatrix::from_fn(count, count, |i, j| {
+        let right = DVector::from_fn(count, |i, _| self.products[(set.swept[i].0, last)]);
+        let factors = self.posterior_precision(set).cholesky();
+        let solved = factors.map_or_else(|| DVector::zeros(count), |factors| factors.solve(&right));
+        set.swept.iter().map(|(direction, _)| *direction).zip(solved.iter().copied()).collect()
+    }
+
+    /// How many coefficients of a set the data determine, and not the prior: the sum of `l / (l + precision)` of all, with `l` what the data know
+    /// of each.
+    pub(crate) fn determined(&self, set: &Set) -> f64 {
+        let Some(factors) = self.posterior_precision(set).cholesky() else { return 0.0 };
+        let covariance = factors.inverse();
+        let of_prior = set.swept.iter().enumerate().map(|(i, (_, precision))| precision * covariance[(i, i)]);
+        set.swept.len() as f64 - of_prior.sum::<f64>()
+    }
+
+    /// The products of the directions in a set, with the prior precision of each.
+    fn posterior_precision(&self, set: &Set) -> DMatrix<f64> {
+        let count = set.swept.len();
+        DMatrix::from_fn(count, count, |i, j| {
             let ((a, precision), (b, _)) = (set.swept[i], set.swept[j]);
             self.products[(a, b)] + if i == j { precision } else { 0.0 }
-        });
-        let right = DVector::from_fn(count, |i, _| self.products[(set.swept[i].0, last)]);
-        let solved = matrix.cholesky().map_or_else(|| DVector::zeros(count), |factors| factors.solve(&right));
-        set.swept.iter().map(|(direction, _)| *direction).zip(solved.iter().copied()).collect()
+        })
     }
 }
 

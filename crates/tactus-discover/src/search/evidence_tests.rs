@@ -76,3 +76,23 @@ fn a_coefficient_of_the_wrong_sign_gains_nothing() {
         assert_eq!(evidence.gain(&evidence.none(), 0).ln_likelihood > 0.0, gains, "{signs:?}");
     }
 }
+
+/// Of orthogonal directions each is determined to `l / (l + precision)`.
+#[test]
+fn what_hardly_any_reading_sees_is_determined_by_the_prior() {
+    let sizes = [400.0, 100.0, 1e-6];
+    let mut products = DMatrix::zeros(4, 4);
+    for (direction, size) in sizes.into_iter().enumerate() {
+        products[(direction, direction)] = size;
+        products[(direction, 3)] = size;
+        products[(3, direction)] = size;
+    }
+    products[(3, 3)] = 2000.0;
+    let additions = additions(&[3]);
+    let evidence = Evidence { additions: &additions, products: &products, variance: 1.0, present: &[] };
+    let set = evidence.set([0]);
+    let precision = set.swept[0].1;
+    let want: f64 = sizes.iter().map(|size| size / (size + precision)).sum();
+    let got = evidence.determined(&set);
+    assert!((got - want).abs() < 1e-9 && (1.8..2.001).contains(&got), "{got} {want}");
+}

@@ -308,8 +308,8 @@ impl Seen {
     /// How far the element is from the tip, along the direction of the last move aside.
     fn ahead_mm(&self, bin: usize, element: usize) -> f64 {
         let [x, y] = self.offset_from_tip_mm(bin, element);
-        let [along_x, along_y] = [0, 1].map(|axis: usize| self.forms.history().aside[axis][bin]);
-        (x * along_x + y * along_y) / along_x.hypot(along_y).max(1.0)
+        let [along_x, along_y] = self.forms.history().heading[bin];
+        x * along_x + y * along_y
     }
 
     /// A factor for each bin, times a form.

@@ -19,6 +19,8 @@ use crate::data::spectrum::transform;
 /// Cells of the covariate's range; the transform has several times as many points, so that no tone lies between two frequencies.
 const CELLS: usize = 8192;
 const FINER: usize = 4;
+/// So often is the distance between two tried frequencies halved.
+const HALVINGS: i32 = 8;
 /// Least number of periods in the range; anything slower is a smooth function.
 const PERIODS_LEAST: usize = 3;
 /// A period has at least this many cells.
@@ -60,7 +62,36 @@ pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone), per_unit_
     let power = |place: &usize| series[*place][0].powi(2) + series[*place][1].powi(2);
     let places = FINER * frequencies.start..FINER * frequencies.end;
     let best = places.max_by(|a, b| power(a).total_cmp(&power(b)))?;
-    Some(Tone { per_unit: best as f64 / (FINER as f64 * range), among: frequencies.len() as f64 })
+    let centred = |[wanted, square]: &[f64; 2]| wanted - mean * square;
+    let series: Vec<f64> = cells.sums.iter().map(centred).collect();
+    let periods = between(&series, best as f64 / FINER as f64);
+    Some(Tone { per_unit: periods / range, among: frequencies.len() as f64 })
+}
+
+/// The number of periods in the range, between the tried ones, at which the power is greatest: a tone that is off by an eighth of a period at the ends
+/// of the data would be off by more beyond them.
+fn between(series: &[f64], periods: f64) -> f64 {
+    let power = |periods: f64| {
+        let turn = std::f64::consts::TAU * periods / series.len() as f64;
+        let [mut real, mut imaginary] = [0.0; 2];
+        for (cell, value) in series.iter().enumerate() {
+            let (sin, cos) = (turn * cell as f64).sin_cos();
+            real += value * cos;
+            imaginary += value * sin;
+        }
+        real * real + imaginary * imaginary
+    };
+    let mut best = (power(periods), periods);
+    for halving in 1..=HALVINGS {
+        let step = 0.5_f64.powi(halving) / FINER as f64;
+        for next in [best.1 - step, best.1 + step] {
+            let of_next = power(next);
+            if of_next > best.0 {
+                best = (of_next, next);
+            }
+        }
+    }
+    best.1
 }
 
 #[cfg(test)]

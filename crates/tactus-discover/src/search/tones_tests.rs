@@ -16,6 +16,17 @@ fn a_tone_is_found_at_values_that_are_not_spaced_evenly() {
     assert!((tone.per_unit - 1.37).abs() < 0.2 / 70.0, "{tone:?}");
 }
 
+/// Without noise the place of the greatest power is that of the tone, but for what the cells blur: a hundredth of a period over all the data.
+#[test]
+fn a_clear_tone_is_found_to_a_hundredth_of_a_period() {
+    let values: Vec<f64> = (0..6000).map(|frame| f64::from(frame) / 30.0).collect();
+    for per_unit in [0.913_4, 2.271_77, 7.3061] {
+        let made = points(&values, |value| (std::f64::consts::TAU * per_unit * value + 0.3).sin());
+        let tone = clearest(&made.into_iter(), f64::INFINITY).unwrap();
+        assert!((tone.per_unit - per_unit).abs() * 200.0 < 0.01, "{per_unit}: {tone:?}");
+    }
+}
+
 #[test]
 fn a_constant_residual_has_no_tone_where_the_weights_have_one() {
     let tau = std::f64::consts::TAU;

@@ -67,6 +67,11 @@ pub(crate) fn conclude(
         exchanged: &exchanged,
     };
     let judged = judge.judged(confirmed)?;
+    let of_draft = match &judged.draft {
+        Some(Ok(found)) => corrected(found.p_value),
+        _ => 1.0,
+    };
+    let p_value = p_value.min(of_draft);
     search.reporter.tell("opening the held-out presses");
     let Opened { levels: [base_level, grown_level], closed, is_left, verdict } =
         judge.opened(&judged, &of_base)?;

@@ -5,6 +5,7 @@ use tactus_model::effect::{Definition, Draft};
 
 use super::closed::{Closed, MOST_ERRORS};
 use super::discovery::{BaseModel, Verdict};
+use super::judged::TESTS;
 use super::residual::{Presses, Residual};
 use crate::data::{DiscoverError, Floor};
 use crate::fit::{Fitted, Prepared, Term};
@@ -60,21 +61,29 @@ pub(super) struct Leaves<'a> {
     pub(super) verdict: Verdict,
     /// True if a test rejects the model.
     pub(super) is_left: bool,
+    /// True if what is seen may be what repeats of rounding.
+    pub(super) may_be_rounding: bool,
     pub(super) grown: &'a Fitted,
     pub(super) floor: Floor,
     /// What a draft has to be better than.
     pub(super) against: Against<'a>,
 }
 
-/// Drafts what a grown model leaves, if that is anything. What is left may be too little for the verdict and still be seen.
+/// Drafts what a grown model leaves, if that is anything. What is left may be too little for the verdict and still be seen. Where no test sees anything,
+/// the drafts are one more test.
 pub(super) fn drafted(
     prepared: &Prepared<'_>,
     search: &Search<'_>,
     leaves: &Leaves<'_>,
 ) -> Result<Option<Outcome>, DiscoverError> {
-    let Leaves { verdict, is_left, grown, floor, against } = *leaves;
-    let may_be_drafted = is_open(verdict) || (verdict == Verdict::Explained && is_left);
-    if !may_be_drafted || search.options.rule != Rule::Protocol {
+    let Leaves { verdict, is_left, may_be_rounding, grown, floor, against } = *leaves;
+    let alpha = match verdict {
+        Verdict::Unexplained | Verdict::PartlyExplained => ALPHA,
+        Verdict::Explained if is_left => ALPHA,
+        Verdict::NothingMissing | Verdict::CannotJudge if !may_be_rounding => ALPHA / TESTS as f64,
+        Verdict::Explained | Verdict::NothingMissing | Verdict::CannotJudge => return Ok(None),
+    };
+    if search.options.rule != Rule::Protocol {
         return Ok(None);
     }
     let known = &prepared.known.effects;
@@ -92,12 +101,13 @@ pub(super) fn drafted(
         let added = grown.parameters.terms.iter().skip(search.known_terms);
         closed.extend(added.map(|term| term.definition.stage()));
     }
-    let found = match search.draft(grown, &name, against, &closed)? {
+    let found = match search.draft(grown, &name, alpha, against, &closed)? {
         Ok(found) => found,
-        Err(why) => return Ok((verdict != Verdict::Explained).then_some(Err(why))),
+        Err(why) => return Ok(is_open(verdict).then_some(Err(why))),
     };
     if verdict != Verdict::Explained {
-        return describing(prepared, grown, found, floor).map(Some);
+        let described = describing(prepared, grown, found, floor)?;
+        return Ok(Some(described).filter(|described| described.is_ok() || is_open(verdict)));
     }
     // Names explain all that matters. A second covariate may have brought a draft to another stage.
     let stands = !closed.contains(&found.draft.stage())

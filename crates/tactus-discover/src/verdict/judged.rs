@@ -219,14 +219,22 @@ impl Judge<'_> {
         let p_value = least_p_value([left.p_value, after.p_value, of_noise[0].p_value, of_noise[1].p_value]);
         let structured = prepared.structured(&residual, Presses::Fitted, floor);
         // A model is never further than the base model from the presses that it was fitted to.
-        let evidence = self.evidence(grown, p_value, floor, structured, None);
+        let mut evidence = self.evidence(grown, p_value, floor, structured, None);
         let given_up = self.given_up(&confirmed, gave_way);
         let refuted: Vec<&str> =
             given_up.iter().filter(|one| one.is_refuted()).map(|one| one.effect).collect();
         let against = against.unwrap_or(Against::Classes { refuted: &refuted });
-        let verdict = evidence.verdict();
-        let leaves = Leaves { verdict, is_left: evidence.is_left, grown, floor, against };
+        let leaves = Leaves {
+            verdict: evidence.verdict(),
+            is_left: evidence.is_left,
+            may_be_rounding: self.may_be_rounding(structured),
+            grown,
+            floor,
+            against,
+        };
         let draft = drafted(prepared, search, &leaves)?;
+        evidence.is_missing |= matches!(draft, Some(Ok(_)));
+        let verdict = evidence.verdict();
         Ok(Judged { confirmed, left, after, of_noise, p_value, residual, floor, verdict, given_up, draft })
     }
 
@@ -237,7 +245,8 @@ impl Judge<'_> {
         let levels = [of_base, residual].map(|residual| self.prepared.level(residual, *floor));
         let closed =
             if self.has_gap() { self.prepared.closed([of_base, residual], grown, *floor)? } else { None };
-        let evidence = self.evidence(grown, *p_value, *floor, levels[1].structured, closed);
+        let mut evidence = self.evidence(grown, *p_value, *floor, levels[1].structured, closed);
+        evidence.is_missing |= matches!(judged.draft, Some(Ok(_)));
         Ok(Opened { levels, closed, is_left: evidence.is_left, verdict: evidence.verdict() })
     }
 
@@ -256,9 +265,7 @@ impl Judge<'_> {
         closed: Option<Closed>,
     ) -> Evidence {
         let Self { prepared, search, .. } = *self;
-        let upper_noise = structured.map_or(f64::INFINITY, |part| part.upper_noise);
-        // Each test sees what repeats of rounding.
-        let may_be_rounding = prepared.noise.may_be_rounding(upper_noise * upper_noise);
+        let may_be_rounding = self.may_be_rounding(structured);
         let is_named = !names(&grown.parameters, search.known_terms).is_empty();
         let tolerance_counts = search.options.tolerance_counts;
         Evidence {
@@ -270,11 +277,16 @@ impl Judge<'_> {
             closed_most: closed.map_or(f64::INFINITY, |closed| {
                 closed.share + closed.standard_error.unwrap_or(f64::INFINITY)
             }),
-            upper_noise,
+            upper_noise: upper_noise(structured),
             tolerance_noise: tolerance_counts
                 .zip(floor.rms_counts())
                 .map_or(0.0, |(tolerance, noise)| tolerance / noise),
         }
+    }
+
+    /// True if what is structured is no more than what repeats of rounding, which each test sees.
+    fn may_be_rounding(&self, structured: Option<Structured>) -> bool {
+        self.prepared.noise.may_be_rounding(upper_noise(structured).powi(2))
     }
 
     /// Effects that were fitted and are not in a model, and why.
@@ -292,16 +304,22 @@ impl Judge<'_> {
     }
 }
 
+/// The upper bound of what is structured; infinite if that is unknown.
+fn upper_noise(structured: Option<Structured>) -> f64 {
+    structured.map_or(f64::INFINITY, |part| part.upper_noise)
+}
+
 /// True if a class lost against a rival: it was fitted because a test of the effects rejects the model without it.
 fn has_refused(contests: &[Contest]) -> bool {
     contests.iter().any(|contest| !contest.kept)
 }
 
-/// Tests of a model: by effects, by covariates, of the scatter, and of the noise that should be each reading's own.
-const TESTS: usize = 4;
+/// Tests of a model: by effects, by covariates, of the scatter, of the noise that should be each reading's own, and by drafts, which are looked for
+/// where no other test rejects.
+pub(super) const TESTS: usize = 5;
 
-/// The least p-value of a model's tests, corrected.
-pub(super) fn least_p_value(of_tests: [f64; TESTS]) -> f64 {
+/// The least p-value of a model's tests but that by drafts, corrected.
+pub(super) fn least_p_value(of_tests: [f64; TESTS - 1]) -> f64 {
     of_tests.into_iter().map(corrected).fold(1.0, f64::min)
 }
 
@@ -315,7 +333,7 @@ pub(super) fn corrected(p_value: f64) -> f64 {
 struct Evidence {
     /// Effects were added and not withdrawn.
     is_named: bool,
-    /// A test rejects the base model.
+    /// A test rejects the base model, or a draft tells what it misses.
     is_missing: bool,
     /// A test rejects the grown model.
     is_left: bool,

@@ -8,18 +8,23 @@
 //!
 //! A law is a formula with one shape, such as an exponential with its length, and a scale. For each shape the scale follows from least squares
 //! under `H`. What recalibration takes up, such as a constant share of the own signal, costs nothing, so each law may have a constant beside
-//! it in the fit, which is dropped where that costs nothing. A curve becomes the law that costs least if that is less than a form is excused
-//! for; else it stays a table.
+//! it in the fit, which is dropped where that costs nothing. A curve becomes the law that costs least if that is less than a form may miss and noise
+//! makes it miss; else it stays a table.
+
+use std::cmp::Ordering;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::Law;
 
-use super::grammar::Atom;
+use super::grammar::{self, Atom};
 
 /// Shapes that are tried between the least and the greatest length of a law.
 const SHAPES: usize = 60;
 /// A constant beside a law is dropped if that costs less.
 const FREE_COST: f64 = 1.0;
+/// Two laws cost the same that differ by less.
+const SAME_COST: f64 = 1e-6;
 /// A held mean weighs so much more than a knot.
 const HELD: f64 = 1e3;
 /// A prior so wide that it only keeps what the data do not show at 0.
@@ -31,6 +36,8 @@ pub(super) struct Curve {
     pub(super) values: DVector<f64>,
     /// The products of the columns, in units of the noise's variance.
     pub(super) gram: DMatrix<f64>,
+    /// How many of the values the data determine, and not the prior.
+    pub(super) determined: f64,
     /// By how much a curve that is fitted to the other folds is nearer to the presses of each, block by block.
     pub(super) unseen_gains: Vec<f64>,
 }
@@ -58,6 +65,12 @@ impl Curve {
         self.values.dot(&(&self.gram * &self.values))
     }
 
+    /// With 1 as its largest value; `None` if all are 0.
+    pub(super) fn shared(&self) -> Option<Arc<Vec<f64>>> {
+        let most = self.values.amax();
+        (most > 0.0).then(|| Arc::new(self.values.iter().map(|value| value / most).collect()))
+    }
+
     /// The products with the mean of the knots held, if a constant as large as the curve costs nothing: recalibration takes it up, and the
     /// errors of the knots would be those of the constant.
     fn held_gram(&self) -> Option<DMatrix<f64>> {
@@ -72,6 +85,11 @@ impl Curve {
     fn shift_to(&self, places: &[f64], law: &Law) -> f64 {
         let apart = places.iter().zip(self.values.iter()).map(|(at, value)| law.value(&[*at]) - value);
         apart.sum::<f64>() / places.len() as f64
+    }
+
+    /// By how much a law misses more than noise alone makes the values miss it: a square for each that the data determine beyond the law's own.
+    fn excess(&self, cost: f64, law: &Law) -> f64 {
+        cost - (self.determined - law.numbers().len() as f64).max(0.0)
     }
 
     /// What it costs to have other values.
@@ -91,8 +109,8 @@ fn covariance(gram: &DMatrix<f64>, columns: &DMatrix<f64>) -> Vec<Vec<f64>> {
     inverse.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
-/// The curve as the law that costs least, if that is at most `excused` nats; else as a table.
-pub(super) fn reduced(atom: &Atom, curve: &Curve, excused: f64) -> Reduced {
+/// The curve as the law that costs least, if it misses at most so many nats more than noise makes it miss; else as a table.
+pub(super) fn reduced(atom: &Atom, curve: &Curve, missed: f64) -> Reduced {
     let count = curve.values.len();
     let held_gram = curve.held_gram();
     let all = covariance(held_gram.as_ref().unwrap_or(&curve.gram), &DMatrix::identity(count, count));
@@ -115,9 +133,13 @@ pub(super) fn reduced(atom: &Atom, curve: &Curve, excused: f64) -> Reduced {
         knots.map(|(knot, (at, value))| [*at, value + shift, errors[knot]]).collect()
     };
     let of = |(kind, shape): (Kind, f64)| Some((fitted(places, curve, kind, shape)?, kind, shape));
-    let best = candidates(places).filter_map(of).min_by(|a, b| a.0.0.total_cmp(&b.0.0));
+    let decays = grammar::is_near_an_event(atom.covariates[0]);
+    let cheaper = |one: f64, other: f64| {
+        if (one - other).abs() < SAME_COST { Ordering::Equal } else { one.total_cmp(&other) }
+    };
+    let best = candidates(places, decays).filter_map(of).min_by(|a, b| cheaper(a.0.0, b.0.0));
     let best = best.map(|(best, kind, shape)| refined(places, curve, kind, shape, best));
-    if let Some((_, law, columns)) = best.filter(|(cost, ..)| 0.5 * cost <= excused) {
+    if let Some((_, law, columns)) = best.filter(|(cost, law, _)| 0.5 * curve.excess(*cost, law) <= missed) {
         let shift = if held_gram.is_some() { curve.shift_to(places, &law) } else { 0.0 };
         return Reduced { covariance: covariance(&curve.gram, &columns), law, knots: knots_by(shift) };
     }
@@ -128,8 +150,9 @@ pub(super) fn reduced(atom: &Atom, curve: &Curve, excused: f64) -> Reduced {
     Reduced { law, covariance: all, knots: knots_by(shift) }
 }
 
-/// Laws with a shape, for covariates with these knots. A straight line comes first: of laws that cost the same the first is taken.
-fn candidates(places: &[f64]) -> impl Iterator<Item = (Kind, f64)> + '_ {
+/// Laws with a shape, for covariates with these knots. Of laws that cost the same the first is taken: a straight line; and of two that differ by a
+/// constant that nothing shows the one that is over in time, if the covariate is that since an event (`decays`), else the one that begins at 0.
+fn candidates(places: &[f64], decays: bool) -> impl Iterator<Item = (Kind, f64)> + '_ {
     let (least, most) = (places[0], places[places.len() - 1]);
     let positive = least >= 0.0;
     let lengths =
@@ -145,9 +168,10 @@ fn candidates(places: &[f64]) -> impl Iterator<Item = (Kind, f64)> + '_ {
     let between = places.windows(2).map(|two| f64::midpoint(two[0], two[1]));
     std::iter::once((linear, 1.0))
         .chain(exponents.filter(move |_| positive).map(move |shape| (power, shape)))
-        .chain(
-            of_lengths.flat_map(move |shape| [(exponential, shape), (saturating, shape), (logarithm, shape)]),
-        )
+        .chain(of_lengths.flat_map(move |shape| {
+            let [first, second] = if decays { [exponential, saturating] } else { [saturating, exponential] };
+            [(first, shape), (second, shape), (logarithm, shape)]
+        }))
         .chain(between.map(move |at| (threshold, at)))
 }
 

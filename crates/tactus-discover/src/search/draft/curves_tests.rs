@@ -1,4 +1,6 @@
 use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, Law, When};
 
@@ -12,6 +14,7 @@ fn curve(law: &Law, error: f64) -> Curve {
     Curve {
         values: DVector::from_iterator(AT.len(), AT.iter().map(|at| law.value(&[*at]))),
         gram: DMatrix::identity(AT.len(), AT.len()) / (error * error),
+        determined: 0.0,
         unseen_gains: Vec::new(),
     }
 }
@@ -49,6 +52,33 @@ fn what_no_law_passes_through_stays_a_table() {
     assert!((found.knots[2][2] - 0.05).abs() < 1e-6, "its standard error");
 }
 
+/// Noise alone makes many fine knots miss the law that they follow, by as much as there are.
+#[test]
+fn fine_knots_may_miss_their_law_by_their_noise() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let places: Vec<f64> = (0..28).map(|knot| 0.02 * f64::from(knot)).collect();
+    let fine = Atom::of(Carrier::Counts, When::Always, Covariate::Depth, places.clone());
+    let law = Law::Exponential { scale: 6.0, length: 0.15 };
+    let error = 0.05;
+    // Uniform, with the variance of the error.
+    let mut noise = || error * 12.0_f64.sqrt() * rng.random_range(-0.5..0.5);
+    let mut one = |determined| Curve {
+        values: DVector::from_iterator(28, places.iter().map(|at| law.value(&[*at]) + noise())),
+        gram: DMatrix::identity(28, 28) / (error * error),
+        determined,
+        unseen_gains: Vec::new(),
+    };
+    assert_eq!(reduced(&fine, &one(28.0), 5.0).law.name(), "exponential");
+    assert_eq!(
+        reduced(&fine, &one(0.0), 5.0).law.name(),
+        "table",
+        "values that are not of the data have no noise"
+    );
+    let mut bent = one(28.0);
+    bent.values[14] += 6.0 * error;
+    assert_eq!(reduced(&fine, &bent, 5.0).law.name(), "table");
+}
+
 #[test]
 fn a_constant_that_costs_nothing_is_dropped() {
     // Recalibration takes up any constant: it has no place in the products.
@@ -65,6 +95,21 @@ fn a_constant_that_costs_nothing_is_dropped() {
     let rise = |law: &Law| law.value(&[0.6]) - law.value(&[0.0]);
     assert!((rise(&found) - rise(&law)).abs() < 0.01, "{found:?}");
     assert!(!matches!(found, Law::Table { .. }), "{found:?}");
+}
+
+/// No reading is before the first release: baselines take up any constant. What a release leaves is over in time.
+#[test]
+fn what_follows_an_event_is_over_in_time() {
+    let law = Law::Exponential { scale: 6.0, length: 0.15 };
+    let mut one = curve(&law, 0.05);
+    let projection = DMatrix::identity(7, 7) - DMatrix::from_element(7, 7, 1.0 / 7.0);
+    one.gram = &projection * one.gram * &projection;
+    one.values.add_scalar_mut(-3.0);
+    let since = Atom::of(Carrier::Counts, When::Always, Covariate::SinceRelease, AT.to_vec());
+    let found = reduced(&since, &one, 5.0).law;
+    assert!(matches!(found, Law::Exponential { scale, .. } if (scale - 6.0).abs() < 0.2), "{found:?}");
+    let found = reduced(&atom(), &one, 5.0).law;
+    assert!(matches!(found, Law::Saturating { scale, .. } if (scale + 6.0).abs() < 0.2), "{found:?}");
 }
 
 #[test]

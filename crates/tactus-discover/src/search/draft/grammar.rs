@@ -11,6 +11,7 @@
 //! | a jump, counts by the element's counts | 2026-11-28 | `range-switch`: drafted as a curve of the signal |
 //! | fine knots by height | 2026-11-28 | `adhesion`, and `proximity` with it: what is gone a little above the surface |
 //! | counts by the place, x and y, always | 2026-11-29 | `arm-shadow` |
+//! | counts since a release, always | 2026-11-29 | `static-charge`: what lasts into the next press was drafted with half of its length |
 
 use std::sync::Arc;
 
@@ -37,6 +38,8 @@ pub(super) struct Atom {
     pub(super) knots: Vec<Vec<f64>>,
     /// Periods per unit of the covariate, of a tone.
     pub(super) per_unit: Option<f64>,
+    /// True of a jump: straight lines on both sides of a place.
+    pub(super) is_jump: bool,
     /// True if each element has a weight of its own, that is to be found.
     pub(super) of_elements: bool,
     /// The curve that all elements share, once it is known.
@@ -145,6 +148,7 @@ const ELSEWHERE: &[Group] = &[
         When::Always,
         &[
             Covariate::Time,
+            Covariate::SinceRelease,
             Covariate::PlaceX,
             Covariate::PlaceY,
             Covariate::TravelSpeed,
@@ -159,7 +163,11 @@ const ELSEWHERE: &[Group] = &[
 const OF_EACH: &[Group] = &[
     (Carrier::Counts, When::InContact, &[Covariate::Depth, Covariate::SinceContact]),
     (Carrier::Counts, When::OutOfContact, &[Covariate::SinceRelease]),
-    (Carrier::Counts, When::Always, &[Covariate::TravelSpeed, Covariate::Temperature]),
+    (
+        Carrier::Counts,
+        When::Always,
+        &[Covariate::SinceRelease, Covariate::TravelSpeed, Covariate::Temperature],
+    ),
     (Carrier::OwnSignal, When::InContact, &[Covariate::Signal, Covariate::Depth]),
 ];
 
@@ -218,43 +226,79 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
         let of_elements = constant.clone().map(|atom| Atom { of_elements: true, ..atom });
         [constant, of_elements].into_iter().flatten()
     }));
-    let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
-    let weights: Vec<f64> = problem.weights().collect();
-    let points = |(carrier, when, covariate): Acting| {
-        sight.points(carrier, covariate, when).map(|(reading, value, unit)| Point {
-            value,
-            wanted: weights[reading] * residual[reading] * unit,
-            square: weights[reading] * unit * unit,
-        })
-    };
+    let left = Left::of(problem, at);
     let is_rounding = |covariate| rounds && covariate == Covariate::Counts;
-    for one in each(JUMPING).filter(|(.., covariate)| !is_rounding(*covariate)) {
-        let Some(jump) = jumps::clearest(&points(one)) else { continue };
-        let (carrier, when, covariate) = one;
-        let [least, most] = sight.range(one);
-        let width = JUMP_SHARE * (most - least);
-        let knots = vec![least, jump.at - width, jump.at, most];
-        if knots.is_sorted() {
-            found.push(Atom { among: jump.among, ..Atom::of(carrier, when, covariate, knots) });
-        }
-    }
-    for (carrier, when, covariate) in each(PERIODIC).filter(|(.., covariate)| !is_rounding(*covariate)) {
-        let points = points((carrier, when, covariate));
-        let per_unit_most = if covariate == Covariate::Counts {
-            most_per_count(problem.predictor.known.array.step_counts())
-        } else {
-            f64::INFINITY
-        };
-        if let Some(tone) = clearest(&points, per_unit_most) {
-            let atom = Atom::of(carrier, when, covariate, Vec::new());
-            found.push(Atom { per_unit: Some(tone.per_unit), among: tone.among, ..atom });
-        }
-    }
+    let may_be = |(.., covariate): &Acting| !is_rounding(*covariate);
+    found.extend(each(JUMPING).filter(may_be).filter_map(|one| jump(&left, sight, one)));
+    found.extend(each(PERIODIC).filter(may_be).filter_map(|one| tone(&left, sight, one)));
     found
 }
 
+/// A jump or a tone where the residual at this model has it, with the weights that it has; any other atom as it is.
+pub(super) fn picked_anew(atom: Atom, problem: &Problem<'_>, at: &Fitted, sight: &Sight) -> Atom {
+    let acting = (atom.carrier, atom.when, atom.covariates[0]);
+    let left = || Left::of(problem, at);
+    let anew = match (atom.is_jump, atom.per_unit) {
+        (true, _) => jump(&left(), sight, acting),
+        (_, Some(_)) => tone(&left(), sight, acting),
+        (false, None) => None,
+    };
+    anew.map_or(atom.clone(), |anew| Atom { weights: atom.weights, ..anew })
+}
+
+/// What a model leaves, reading by reading.
+struct Left {
+    residual: Vec<f64>,
+    weights: Vec<f64>,
+    /// Most periods of a tone per count.
+    per_count_most: f64,
+}
+
+impl Left {
+    fn of(problem: &Problem<'_>, at: &Fitted) -> Self {
+        Self {
+            residual: problem.residuals(&at.predicted).collect(),
+            weights: problem.weights().collect(),
+            per_count_most: most_per_count(problem.predictor.known.array.step_counts()),
+        }
+    }
+
+    /// The residual along a covariate.
+    fn along(
+        &self,
+        sight: &Sight,
+        (carrier, when, covariate): Acting,
+    ) -> impl Iterator<Item = Point> + Clone {
+        sight.points(carrier, covariate, when).map(|(reading, value, unit)| Point {
+            value,
+            wanted: self.weights[reading] * self.residual[reading] * unit,
+            square: self.weights[reading] * unit * unit,
+        })
+    }
+}
+
+/// The clearest jump of what is left.
+fn jump(left: &Left, sight: &Sight, acting: Acting) -> Option<Atom> {
+    let jump = jumps::clearest(&left.along(sight, acting))?;
+    let (carrier, when, covariate) = acting;
+    let [least, most] = sight.range(acting);
+    let width = JUMP_SHARE * (most - least);
+    let knots = vec![least, jump.at - width, jump.at, most];
+    let atom = |knots| Atom::of(carrier, when, covariate, knots);
+    knots.is_sorted().then(|| Atom { among: jump.among, is_jump: true, ..atom(knots) })
+}
+
+/// The clearest tone of what is left.
+fn tone(left: &Left, sight: &Sight, acting: Acting) -> Option<Atom> {
+    let (carrier, when, covariate) = acting;
+    let most = if covariate == Covariate::Counts { left.per_count_most } else { f64::INFINITY };
+    let tone = clearest(&left.along(sight, acting), most)?;
+    let atom = Atom::of(carrier, when, covariate, Vec::new());
+    Some(Atom { per_unit: Some(tone.per_unit), among: tone.among, ..atom })
+}
+
 /// True of a time since something happened, and of a distance from where it does.
-const fn is_near_an_event(covariate: Covariate) -> bool {
+pub(super) const fn is_near_an_event(covariate: Covariate) -> bool {
     matches!(
         covariate,
         Covariate::SinceContact | Covariate::SinceTurn | Covariate::SinceRelease | Covariate::Height
@@ -294,6 +338,7 @@ impl Atom {
             covariates: vec![covariate],
             knots: if knots.is_empty() { Vec::new() } else { vec![knots] },
             per_unit: None,
+            is_jump: false,
             of_elements: false,
             curve: None,
             weights: None,

@@ -320,16 +320,14 @@ impl Atom {
                 None => return 0.0,
             }
         }
-        if let Some(per_unit) = self.per_unit {
-            let (sin, cos) = (std::f64::consts::TAU * per_unit * values[0]).sin_cos();
-            return if curve == Some(0) { sin } else { cos };
-        }
-        let at = |knot: usize| match self.knots.as_slice() {
-            [only] => hat(only, knot, values[0]),
-            [first, second] => {
+        let turn = self.per_unit.map(|per_unit| (std::f64::consts::TAU * per_unit * values[0]).sin_cos());
+        let at = |knot: usize| match (turn, self.knots.as_slice()) {
+            (Some((sin, cos)), _) => [sin, cos][knot],
+            (None, [only]) => hat(only, knot, values[0]),
+            (None, [first, second]) => {
                 hat(first, knot / second.len(), values[0]) * hat(second, knot % second.len(), values[1])
             }
-            _ => 1.0,
+            (None, _) => 1.0,
         };
         match (curve, &self.curve) {
             (Some(knot), _) => at(knot),

@@ -1,0 +1,327 @@
+//! The form of a draft: knots, weights, a second covariate and a law, each as far as the data show it.
+//!
+//! An atom that won has a coarse curve: enough to tell what acts on what. Here its curve gets as many knots as the evidence carries, its elements get
+//! weights, and a second covariate comes beside the first, where that gains more than a form may miss, and holds for presses that had no part in it. The curve becomes a law if one
+//! passes through it as nearly. Then the draft is fitted as an effect, which moves all else, and its curve is made once more where the others are
+//! then: what a model without the draft predicts is what it acts on, and until then that had taken up a part of it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use tactus_model::effect::{Carrier, Draft};
+
+use super::grammar::Atom;
+use super::sight::Sight;
+use super::{
+    COLUMNS_MAX, KNOTS, KNOTS_OF_SECOND, additions, as_good_as_first, curves, grammar, ranked, words,
+};
+use crate::data::DiscoverError;
+use crate::fit::{FOLDS, Fitted, Grams, Term};
+use crate::search::evidence::Addition;
+use crate::search::grow::{POLISH_ROUNDS, Search};
+
+/// What the form of a draft may miss, as a share of what the draft explains: a curve is to be within 10 % (rms) of the physics, which is a
+/// hundredth of the squares, and three choices of form share it (weights, a second covariate, a law).
+const MISSED_SHARE: f64 = 0.01 / 3.0;
+/// The least that one more part of a form must gain, as the logarithm of its odds.
+const MISSED_LN_ODDS: f64 = 5.0;
+/// Numbers of knots among which the evidence chooses, as multiples of those of the grammar.
+const FINER: [usize; 2] = [2, 4];
+const FINER_OF_SECOND: usize = 2;
+
+/// A draft as an effect, fitted.
+pub(super) struct AsEffect {
+    pub(super) draft: Draft,
+    pub(super) at: Fitted,
+    pub(super) covariance: Vec<Vec<f64>>,
+    pub(super) knots: Vec<[f64; 3]>,
+    pub(super) unseen_gains: Vec<f64>,
+}
+
+/// Something that a form gains, as the logarithm of its odds.
+type Gained<T> = Option<(f64, T)>;
+
+impl Search<'_> {
+    /// An atom, which was the best of so many, as an effect; `None` if that gains nothing.
+    pub(super) fn as_effect(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atom: Atom,
+        among: f64,
+        name: &str,
+    ) -> Result<Option<AsEffect>, DiscoverError> {
+        let atom = self.with_form(at, sight, atom, among)?;
+        let Some(first) = self.in_form(at, sight, &atom, name, at.cost)? else { return Ok(None) };
+        let without = self.without_last(&first.at)?;
+        let sight = Arc::new(Sight::of(self.problem, &without)?);
+        let atom = grammar::picked_anew(atom, self.problem, &without, &sight);
+        let again = self.in_form(&without, &sight, &atom, name, first.at.cost)?;
+        let unseen_gains = first.unseen_gains.clone();
+        Ok(Some(again.map_or(first, |again| AsEffect { unseen_gains, ..again })))
+    }
+
+    /// The atom with the knots, the weights and the second covariate that the data show.
+    fn with_form(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atom: Atom,
+        among: f64,
+    ) -> Result<Atom, DiscoverError> {
+        if atom.of_elements {
+            let coarse = self.with_weights(at, sight, atom)?;
+            let fine = self.with_best_knots(at, sight, finer(&coarse, sight))?;
+            let shared = self.curve(at, sight, &fine)?.shared();
+            return self.with_weights(at, sight, Atom { of_elements: true, curve: shared, ..fine });
+        }
+        let fine = self.with_best_knots(at, sight, finer(&atom, sight))?;
+        let weights = self.weights_beside(at, sight, &fine)?;
+        let second = self.second_beside(at, sight, &fine, &atom, among)?;
+        let weighted = |atom: Atom, weights| Atom { weights: Some(weights), ..atom };
+        match (weights, second) {
+            (None, None) => Ok(fine),
+            (Some((_, weights)), None) => Ok(weighted(fine, weights)),
+            (None, Some((_, both))) => self.with_best_knots(at, sight, finer_of_both(&both, &fine, sight)),
+            (Some((by_weights, weights)), Some((by_second, _))) if by_weights >= by_second => {
+                let (fine, coarse) = (weighted(fine, Arc::clone(&weights)), weighted(atom, weights));
+                match self.second_beside(at, sight, &fine, &coarse, among)? {
+                    Some((_, both)) => self.with_best_knots(at, sight, finer_of_both(&both, &fine, sight)),
+                    None => Ok(fine),
+                }
+            }
+            (Some(_), Some((_, both))) => {
+                let both = self.with_best_knots(at, sight, finer_of_both(&both, &fine, sight))?;
+                let weights = self.weights_beside(at, sight, &both)?;
+                Ok(weights.map_or(both.clone(), |(_, weights)| weighted(both, weights)))
+            }
+        }
+    }
+
+    /// Of atoms that differ in their knots alone the one that the data prefer.
+    fn with_best_knots(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atoms: Vec<Atom>,
+    ) -> Result<Atom, DiscoverError> {
+        let [only] = atoms.as_slice() else {
+            let (weighed, grams) = self.products(at, sight, atoms)?;
+            let additions = additions(&weighed, &grams, 1.0);
+            let ranked = ranked(&self.evidence_of(&additions, grams.reduced()));
+            let as_good = as_good_as_first(&ranked).into_iter();
+            let best = as_good.min_by_key(|(one, _)| weighed[*one].directions.len());
+            return Ok(weighed[best.map_or(0, |(one, _)| one)].atom.clone());
+        };
+        Ok(only.clone())
+    }
+
+    /// The atom with a second covariate and what that gains beside the fine curve of the first one, if it is more than a form may miss.
+    fn second_beside(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        fine: &Atom,
+        coarse: &Atom,
+        among: f64,
+    ) -> Result<Gained<Atom>, DiscoverError> {
+        let seconds: Vec<Atom> = grammar::with_seconds(coarse, sight).collect();
+        let Some(each) = seconds.first().map(|second| second.columns(sight.elements)) else {
+            return Ok(None);
+        };
+        let mut best: Gained<Atom> = None;
+        let room = COLUMNS_MAX.saturating_sub(fine.columns(sight.elements));
+        for some in seconds.chunks((room / each).max(1)) {
+            let atoms = std::iter::once(fine).chain(some).cloned().collect();
+            let (weighed, grams) = self.products(at, sight, atoms)?;
+            let additions = additions(&weighed, &grams, among * seconds.len() as f64);
+            let evidence = self.evidence_of(&additions, grams.reduced());
+            let first = evidence.set([0]);
+            let gains = (1..weighed.len()).map(|second| (evidence.gain(&first, second).ln_odds, second));
+            let Some((gain, second)) = gains.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+            let is_best = best.as_ref().is_none_or(|(most, _)| gain > *most);
+            if is_best && gain > missed(first.ln_odds) && self.holds(&grams, &additions, [0, second]) {
+                best = Some((gain, weighed[second].atom.clone()));
+            }
+        }
+        Ok(best)
+    }
+
+    /// Weights of the elements for an atom that acts on all alike, and what they gain, if that is more than a form may miss.
+    fn weights_beside(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atom: &Atom,
+    ) -> Result<Gained<Arc<Vec<f64>>>, DiscoverError> {
+        let may_have = matches!(atom.carrier, Carrier::Counts | Carrier::OwnSignal | Carrier::EveryElement);
+        if !may_have || atom.weights.is_some() {
+            return Ok(None);
+        }
+        let Some(shared) = self.curve(at, sight, atom)?.shared() else { return Ok(None) };
+        let beside = Atom { of_elements: true, curve: Some(shared), ..atom.clone() };
+        let (weighed, grams) = self.products(at, sight, vec![atom.clone(), beside])?;
+        let additions = additions(&weighed, &grams, 1.0);
+        let evidence = self.evidence_of(&additions, grams.reduced());
+        let common = evidence.set([0]);
+        let gain = evidence.gain(&common, 1).ln_odds;
+        if gain <= missed(common.ln_odds) || !self.holds(&grams, &additions, [0, 1]) {
+            return Ok(None);
+        }
+        let found: BTreeMap<usize, f64> = evidence.coefficients(&evidence.set([0, 1])).into_iter().collect();
+        let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
+        let of_common = weighed[0].directions.iter().map(value);
+        let most = of_common.fold(f64::MIN_POSITIVE, |most: f64, one| most.max(one.abs()));
+        let weights = weighed[1].directions.iter().map(|one| 1.0 + value(one) / most).collect();
+        Ok(Some((gain, Arc::new(weights))))
+    }
+
+    /// An atom of single elements with the weight of each; the largest is 1.
+    fn with_weights(&self, at: &Fitted, sight: &Arc<Sight>, atom: Atom) -> Result<Atom, DiscoverError> {
+        let atom = Atom { weights: None, ..atom };
+        let weights = self.curve(at, sight, &atom)?.values;
+        let most = weights.amax().max(f64::MIN_POSITIVE);
+        let weights = Arc::new(weights.iter().map(|one| one / most).collect());
+        Ok(Atom { weights: Some(weights), of_elements: false, curve: None, ..atom })
+    }
+
+    /// The coefficients of an atom's columns with the greatest posterior probability.
+    fn curve(&self, at: &Fitted, sight: &Arc<Sight>, atom: &Atom) -> Result<curves::Curve, DiscoverError> {
+        let (weighed, grams) = self.products(at, sight, vec![atom.clone()])?;
+        let additions = additions(&weighed, &grams, 1.0);
+        let evidence = self.evidence_of(&additions, grams.reduced());
+        let set = evidence.set([0]);
+        let found: BTreeMap<usize, f64> = evidence.coefficients(&set).into_iter().collect();
+        let directions = &additions[0].directions;
+        let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
+        let product = |i: usize, j: usize| grams.reduced()[(directions[i], directions[j])];
+        Ok(curves::Curve {
+            unseen_gains: self.unseen_gains(&grams, &additions, &[0]),
+            values: DVector::from_iterator(directions.len(), directions.iter().map(value)),
+            gram: DMatrix::from_fn(directions.len(), directions.len(), product) / self.problem.variance,
+            determined: evidence.determined(&set),
+        })
+    }
+
+    /// By how much additions that are fitted to the other folds are nearer to the presses of each, block by block.
+    fn unseen_gains(&self, grams: &Grams, additions: &[Addition], members: &[usize]) -> Vec<f64> {
+        let of_others = |fold: usize| -> Vec<(usize, f64)> {
+            let products = grams.without(fold);
+            let evidence = self.evidence_of(additions, &products);
+            evidence.coefficients(&evidence.set(members.iter().copied()))
+        };
+        let by_folds: Vec<Vec<(usize, f64)>> = (0..FOLDS).map(of_others).collect();
+        grams.gains(|fold| &by_folds[fold])
+    }
+
+    /// True if one more part of a form comes nearer to presses that it has not seen than the form without it.
+    fn holds(&self, grams: &Grams, additions: &[Addition], [form, part]: [usize; 2]) -> bool {
+        let unseen = |members: &[usize]| self.unseen_gains(grams, additions, members).iter().sum::<f64>();
+        unseen(&[form, part]) > unseen(&[form])
+    }
+
+    /// The atom's curve, as a law or a table, fitted as an effect; `None` if it does not come nearer to the data than this cost.
+    fn in_form(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atom: &Atom,
+        name: &str,
+        cost: f64,
+    ) -> Result<Option<AsEffect>, DiscoverError> {
+        let curve = self.curve(at, sight, atom)?;
+        let reduced = curves::reduced(atom, &curve, missed(0.5 * curve.squares()));
+        let draft = words::named(sight, atom, reduced.law, name);
+        Ok(self.taken(at, draft, cost)?.map(|(draft, fitted, by)| AsEffect {
+            draft,
+            at: fitted,
+            covariance: scaled(reduced.covariance, by * by),
+            unseen_gains: curve.unseen_gains,
+            knots: reduced.knots.into_iter().map(|[at, value, error]| [at, by * value, by * error]).collect(),
+        }))
+    }
+
+    /// The draft as a term of the model, with its law as it is fitted, so that its strength is 1; `None` if it does not come nearer to the data
+    /// than this cost.
+    fn taken(
+        &self,
+        at: &Fitted,
+        draft: Draft,
+        cost: f64,
+    ) -> Result<Option<(Draft, Fitted, f64)>, DiscoverError> {
+        let term = Term::of_draft(draft.clone().define()?);
+        let fitted = self.problem.fit_from(at.parameters.with(term), POLISH_ROUNDS)?;
+        let [along, quadrature] = fitted.parameters.terms.last().map_or([0.0; 2], Term::strength_of_draft);
+        let strength = along.hypot(quadrature);
+        if along <= 0.0 || fitted.cost >= cost {
+            return Ok(None);
+        }
+        let draft = Draft { law: draft.law.turned([along, quadrature]), ..draft };
+        let draft = Draft { sentence: words::sentence(&draft), ..draft };
+        // The prediction is the same: a draft is its strength times its law.
+        let mut parameters = fitted.parameters;
+        if let Some(last) = parameters.terms.last_mut() {
+            *last = Term::of_draft(draft.clone().define()?);
+        }
+        let mut errors = fitted.errors;
+        errors.last_mut().into_iter().flatten().for_each(|error| *error /= strength);
+        Ok(Some((draft, Fitted { parameters, errors, ..fitted }, strength)))
+    }
+
+    /// A model as it is fitted, without its last term.
+    fn without_last(&self, with: &Fitted) -> Result<Fitted, DiscoverError> {
+        let mut without = with.clone();
+        without.parameters.terms.pop();
+        without.errors.pop();
+        without.predicted = self.problem.predict(&without.parameters)?;
+        without.cost = self.problem.cost(&without.predicted);
+        Ok(without)
+    }
+}
+
+/// The atom, and with more knots, as far as the readings have places for them.
+pub(super) fn finer(atom: &Atom, sight: &Sight) -> Vec<Atom> {
+    let mut atoms = vec![atom.clone()];
+    if let ([places], [covariate], false) = (atom.knots.as_slice(), atom.covariates.as_slice(), atom.is_jump)
+        && places.len() > 1
+    {
+        for times in FINER {
+            let knots = sight.knots((atom.carrier, atom.when, *covariate), times * KNOTS);
+            if atoms.iter().all(|known| known.knots[0].len() < knots.len()) {
+                atoms.push(Atom { knots: vec![knots], ..atom.clone() });
+            }
+        }
+    }
+    atoms
+}
+
+/// An atom of two covariates, and with the fine knots of the first one, with more of the second, and with both, as far as a pass takes them.
+fn finer_of_both(both: &Atom, fine: &Atom, sight: &Sight) -> Vec<Atom> {
+    let second = (both.carrier, both.when, both.covariates[1]);
+    let more = sight.knots(second, FINER_OF_SECOND * KNOTS_OF_SECOND);
+    let mut columns = both.columns(sight.elements);
+    let mut atoms = vec![both.clone()];
+    for first in [&both.knots[0], &fine.knots[0]] {
+        for second in [&both.knots[1], &more] {
+            let knots = vec![first.clone(), second.clone()];
+            let finer = Atom { knots, ..both.clone() };
+            let of_it = finer.columns(sight.elements);
+            if columns + of_it <= COLUMNS_MAX && atoms.iter().all(|known| known.knots != finer.knots) {
+                columns += of_it;
+                atoms.push(finer);
+            }
+        }
+    }
+    atoms
+}
+
+/// What a form may miss of what a draft explains: both are logarithms of odds, or of likelihoods.
+fn missed(explained: f64) -> f64 {
+    MISSED_LN_ODDS.max(MISSED_SHARE * explained)
+}
+
+/// Rows times a factor.
+fn scaled(rows: Vec<Vec<f64>>, by: f64) -> Vec<Vec<f64>> {
+    rows.into_iter().map(|row| row.into_iter().map(|value| by * value).collect()).collect()
+}
