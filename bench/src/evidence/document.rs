@@ -287,7 +287,7 @@ fn false_alarms(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
     }
     writeln!(
         f,
-        "\nA set that fails or cannot be judged counts as a false alarm. The four tests of a verdict have a nominal level of {} together, \
+        "\nA set that fails or cannot be judged counts as a false alarm. The five tests of a verdict have a nominal level of {} together, \
          after Bonferroni's correction; the target is {} at most.\n",
         percent(ALPHA),
         percent(ORACLE_LEVEL)

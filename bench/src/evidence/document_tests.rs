@@ -29,7 +29,7 @@ fn false_alarms_stand_beside_the_level_of_the_tests() {
     let nominal = format!("a nominal level of {}", percent(ALPHA));
     let line = text.lines().find(|line| line.starts_with("| false alarms")).unwrap_or_default();
     assert!(line.contains(&nominal) && line.contains("at most 2.8 %"), "{line}");
-    assert!(text.lines().any(|line| line.contains("four tests") && line.contains(&nominal)), "{text}");
+    assert!(text.lines().any(|line| line.contains("five tests") && line.contains(&nominal)), "{text}");
 }
 
 #[test]

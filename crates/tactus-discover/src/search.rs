@@ -117,6 +117,9 @@
 //! | tones.rs | `CELLS` | `8192` | cost | of a transform |
 //! | tones.rs | `FINER` | `4` | derived | so that no tone lies between two frequencies |
 //! | tones.rs | `HALVINGS` | `8` | derived | a thousandth of a period over all the data |
+//! | tones.rs | `PAUSE` | `2.5` | convention | more than a lost frame |
+//! | tones.rs | `RHYTHM_STANDS_OUT` | `10.0` | derived | powers without a rhythm are distributed exponentially: `2^-10` of them exceed so much |
+//! | tones.rs | `AROUND` | `10 * FINER` | convention | ten periods |
 //! | tones.rs | `PERIODS_LEAST` | `3` | convention | slower is a smooth function |
 //! | tones.rs | `CELLS_LEAST` | `4` | derived | a tone of two cells is none |
 //! | tones.rs | `STEPS_LEAST` | `2.0` | derived | the codes of a converter show nothing shorter (decision 0048) |

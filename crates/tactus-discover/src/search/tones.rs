@@ -15,10 +15,16 @@
 
 use super::cells::{Cells, Point};
 use crate::data::spectrum::transform;
+use crate::numbers::median;
 
 /// Cells of the covariate's range; the transform has several times as many points, so that no tone lies between two frequencies.
 const CELLS: usize = 8192;
 const FINER: usize = 4;
+/// Readings pause where the next one is so many times as far away as usual.
+const PAUSE: f64 = 2.5;
+/// Factor over the median of the powers around, within ten periods, and over the power of starts without a rhythm, at which presses have one.
+const RHYTHM_STANDS_OUT: f64 = 10.0;
+const AROUND: usize = 10 * FINER;
 /// So often is the distance between two tried frequencies halved.
 const HALVINGS: i32 = 8;
 /// Least number of periods in the range; anything slower is a smooth function.
@@ -45,27 +51,65 @@ pub(super) fn most_per_count(step_counts: f64) -> f64 {
 /// The clearest tone of at most so many periods per unit; `None` if the covariate does not vary, or not by enough for one.
 pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone), per_unit_most: f64) -> Option<Tone> {
     let cells = Cells::of(points, CELLS)?;
-    let (range, [wanted, square]) = (cells.range, cells.total());
-    let mean = wanted / square;
-    let mut series = vec![[0.0; 2]; FINER * CELLS];
-    for (at, [wanted, square]) in series.iter_mut().zip(&cells.sums) {
-        at[0] = wanted - mean * square;
+    cells.clearest(per_unit_most, |_| true)
+}
+
+/// The clearest tone in time but at the rhythm at which presses come: there it is what every press repeats.
+pub(super) fn clearest_beside_rhythm(points: &(impl Iterator<Item = Point> + Clone)) -> Option<Tone> {
+    let cells = Cells::of(points, CELLS)?;
+    let starts = cells.starts();
+    // Starts without a rhythm have this power.
+    let count = starts.iter().sum::<f64>();
+    let rhythm = powers(starts.into_iter().map(|start| start - count / CELLS as f64));
+    let is_beside = |place: usize| {
+        let around = |reach: usize| place.saturating_sub(reach)..(place + reach + 1).min(rhythm.len());
+        let middle = median(&rhythm[around(AROUND)]).max(count);
+        rhythm[around(FINER)].iter().all(|power| *power <= RHYTHM_STANDS_OUT * middle)
+    };
+    cells.clearest(f64::INFINITY, is_beside)
+}
+
+impl Cells {
+    /// 1 at the cells where readings come again after a pause, else 0.
+    fn starts(&self) -> Vec<f64> {
+        let read: Vec<usize> = (0..self.sums.len()).filter(|cell| self.sums[*cell][1] > 0.0).collect();
+        let apart: Vec<f64> = read.windows(2).map(|two| (two[1] - two[0]) as f64).collect();
+        let usual = if apart.is_empty() { 0.0 } else { median(&apart) };
+        let mut starts = vec![0.0; self.sums.len()];
+        for (two, apart) in read.windows(2).zip(&apart) {
+            if *apart > PAUSE * usual {
+                starts[two[1]] = 1.0;
+            }
+        }
+        starts
     }
-    transform(&mut series);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "positive; what is too large is cut off"
-    )]
-    let most = (per_unit_most * range) as usize;
-    let frequencies = PERIODS_LEAST..most.min(CELLS / CELLS_LEAST);
-    let power = |place: &usize| series[*place][0].powi(2) + series[*place][1].powi(2);
-    let places = FINER * frequencies.start..FINER * frequencies.end;
-    let best = places.max_by(|a, b| power(a).total_cmp(&power(b)))?;
-    let centred = |[wanted, square]: &[f64; 2]| wanted - mean * square;
-    let series: Vec<f64> = cells.sums.iter().map(centred).collect();
-    let periods = between(&series, best as f64 / FINER as f64);
-    Some(Tone { per_unit: periods / range, among: frequencies.len() as f64 })
+
+    fn clearest(&self, per_unit_most: f64, is_allowed: impl Fn(usize) -> bool) -> Option<Tone> {
+        let (range, [wanted, square]) = (self.range, self.total());
+        let mean = wanted / square;
+        let series = || self.sums.iter().map(|[wanted, square]| wanted - mean * square);
+        let power = powers(series());
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "positive; what is too large is cut off"
+        )]
+        let most = (per_unit_most * range) as usize;
+        let frequencies = PERIODS_LEAST..most.min(CELLS / CELLS_LEAST);
+        let mut places: Vec<usize> = (FINER * frequencies.start..FINER * frequencies.end).collect();
+        places.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+        let best = places.into_iter().find(|place| is_allowed(*place))?;
+        let periods = between(&series().collect::<Vec<f64>>(), best as f64 / FINER as f64);
+        Some(Tone { per_unit: periods / range, among: frequencies.len() as f64 })
+    }
+}
+
+/// The powers of a series of cells at frequencies that are closer by [`FINER`] than independent ones.
+fn powers(series: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut padded: Vec<[f64; 2]> = series.map(|value| [value, 0.0]).collect();
+    padded.resize(FINER * CELLS, [0.0; 2]);
+    transform(&mut padded);
+    padded.iter().map(|[re, im]| re * re + im * im).collect()
 }
 
 /// The number of periods in the range, between the tried ones, at which the power is greatest: a tone that is off by an eighth of a period at the ends

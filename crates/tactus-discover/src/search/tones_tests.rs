@@ -1,7 +1,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{clearest, most_per_count};
+use super::{clearest, clearest_beside_rhythm, most_per_count};
 use crate::search::cells::{Point, points};
 
 #[test]
@@ -36,6 +36,26 @@ fn a_constant_residual_has_no_tone_where_the_weights_have_one() {
     });
     let tone = clearest(&made, f64::INFINITY).unwrap();
     assert!((tone.per_unit - 0.031).abs() < 0.2 / 2000.0, "{tone:?}");
+}
+
+/// A second of each three is spent in contact. What swings after each stop has tones at thirds of a hertz; a hum has its own.
+#[test]
+fn what_every_press_repeats_is_no_tone_in_time() {
+    let swings = |value: f64| {
+        let since_s = value.rem_euclid(3.0);
+        (-since_s / 0.5).exp() * (std::f64::consts::TAU * 4.3 * since_s).sin()
+    };
+    let hum = |value: f64| 0.5 * (std::f64::consts::TAU * 2.217 * value).sin();
+    let made = |hums: f64| {
+        (0..4500).map(|frame| f64::from(frame) / 10.0).map(move |value| {
+            let square = f64::from(u8::from(value.rem_euclid(3.0) < 1.0));
+            Point { value, wanted: square * (swings(value) + hums * hum(value)), square }
+        })
+    };
+    let tone = clearest(&made(0.0), f64::INFINITY).unwrap();
+    assert!((tone.per_unit - 13.0 / 3.0).abs() < 1e-3, "{tone:?}");
+    let tone = clearest_beside_rhythm(&made(1.0)).unwrap();
+    assert!((tone.per_unit - 2.217).abs() < 5e-3, "{tone:?}");
 }
 
 #[test]

@@ -3,7 +3,7 @@ use std::sync::LazyLock;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use tactus_model::effect::{Carrier, PipelineStage, When};
+use tactus_model::effect::{Carrier, Law, PipelineStage, When};
 use tactus_model::{Covariate, Effect};
 use tactus_schema::table::Phase;
 
@@ -108,6 +108,40 @@ fn counts_that_come_with_contact_are_drafted_with_a_weight_for_each_element() {
         let (got, want) = (counts * own * draft.law.value(&[at]), 6.0 * weight(element));
         assert!((got - want).abs() < 1.5, "{element}: {got} {want}");
     }
+}
+
+/// A tenth of scatter is a hundredth of the squares: too little to tell what the physics is, and enough for its curve.
+#[test]
+fn weights_that_scatter_by_a_tenth_are_drafted() {
+    let weight = |element: usize| 0.85 + 0.05 * (element % 7) as f64;
+    let (known, frames) =
+        with(|_, depth_mm, element| if depth_mm > 0.0 { 6.0 * weight(element) } else { 0.0 });
+    let found = found(&known, &frames);
+    let draft = &drafted(&found).draft;
+    let counts = if draft.carrier == Carrier::Counts { 1.0 } else { 1000.0 };
+    let at = draft.ranges[0].iter().sum::<f64>() / 2.0;
+    let of_element = |own: &f64| counts * own * draft.law.value(&[at]);
+    let got: Vec<f64> = draft.weights.as_ref().expect("weights").iter().map(of_element).collect();
+    let off = |(element, got): (usize, &f64)| (got - 6.0 * weight(element)).powi(2);
+    let rms = (got.iter().enumerate().map(off).sum::<f64>() / got.len() as f64).sqrt();
+    assert!(rms < 0.3, "{rms} of 0.6 that they scatter by: {got:?}");
+}
+
+/// Where the tip rests frames are averaged, but not over a tone.
+#[test]
+fn a_tone_in_contact_has_its_whole_amplitude() {
+    const HZ: f64 = 4.45;
+    let hums = |frame: usize, _: &[f64], depth_mm: f64, _| {
+        if depth_mm > 0.0 { 1.5 * (TAU * HZ * frame as f64 / 10.0).sin() } else { 0.0 }
+    };
+    let (known, frames) = beside(&[], 11, hums);
+    let found = found(&known, &frames);
+    let draft = &drafted(&found).draft;
+    let Law::Periodic { sine, cosine, per_unit, .. } = draft.law else { panic!("{draft:?}") };
+    assert_eq!(draft.carrier, Carrier::Counts);
+    assert!((sine.hypot(cosine) / 1.5 - 1.0).abs() < 0.05, "{}", draft.sentence);
+    // Ten frames a second see two frequencies as one.
+    assert!([HZ, 10.0 - HZ].iter().any(|hz| (per_unit - hz).abs() < 1e-3), "{per_unit}");
 }
 
 /// 10 frames a second see hardly more than its sign.

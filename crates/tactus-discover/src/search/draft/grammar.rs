@@ -23,7 +23,7 @@ use super::{KNOTS, KNOTS_OF_DISTANCE, KNOTS_OF_SECOND};
 use crate::fit::{Fitted, Problem};
 use crate::search::cells::Point;
 use crate::search::jumps;
-use crate::search::tones::{clearest, most_per_count};
+use crate::search::tones::{clearest, clearest_beside_rhythm, most_per_count};
 
 /// A jump is this share of its covariate's range wide: a cell of those among which it was found.
 const JUMP_SHARE: f64 = 1.0 / jumps::CELLS as f64;
@@ -291,8 +291,12 @@ fn jump(left: &Left, sight: &Sight, acting: Acting) -> Option<Atom> {
 /// The clearest tone of what is left.
 fn tone(left: &Left, sight: &Sight, acting: Acting) -> Option<Atom> {
     let (carrier, when, covariate) = acting;
-    let most = if covariate == Covariate::Counts { left.per_count_most } else { f64::INFINITY };
-    let tone = clearest(&left.along(sight, acting), most)?;
+    let along = left.along(sight, acting);
+    let tone = if covariate == Covariate::Time {
+        clearest_beside_rhythm(&along)
+    } else {
+        clearest(&along, if covariate == Covariate::Counts { left.per_count_most } else { f64::INFINITY })
+    }?;
     let atom = Atom::of(carrier, when, covariate, Vec::new());
     Some(Atom { per_unit: Some(tone.per_unit), among: tone.among, ..atom })
 }
