@@ -80,6 +80,7 @@
 //! | spectrum.rs | `FAR_AROUND` | `200` | convention | the same, for a sum that scatters more |
 //! | spectrum.rs | `PERIODS_LEAST` | `12.0` | convention | slower is a drift |
 //! | spectrum.rs | `LINES_MAX` | `3` | cost | each line makes shapes of a candidate |
+//! | spectrum.rs | `FRAMES_LEAST` | `256` | convention | some seconds |
 //! | spectrum.rs | `DRIFT_PARTS` | `8` | convention | a drift of a recording bends seldom |
 
 mod bins;

@@ -41,14 +41,13 @@
 //! | draft.rs | `COLUMNS_MAX` | `512` | cost | the memory of a pass; 200 at first |
 //! | draft.rs | `TRIED_MAX` | `3` | cost | of fits |
 //! | draft.rs | `KNOTS` | `7` | cost | straight lines over six parts of the range |
-//! | draft.rs | `KNOTS_OF_SECOND` | `4` | cost | a table of 7 x 4 values |
+//! | draft.rs | `KNOTS_OF_SECOND` | `4` | cost | a table of 7 x 4 values, of 14 x 8 at most |
 //! | draft.rs | `KNOTS_OF_DISTANCE` | `12` | tried | with wide knots: what acts on every element, near or far |
 //! | draft.rs | `AHEAD_LN_ODDS` | `5.0` | convention | `LN_ODDS_LEAST` |
 //! | draft.rs | `OWN_LEAST` | `0.05` | tried | 0.3 and 0.1 at first |
 //! | draft.rs | `FOLDS_LEAST` | `4` | convention | all but one |
 //! | draft/curves.rs | `SHAPES` | `60` | cost | a step of a grid; refined after |
 //! | draft/curves.rs | `FREE_COST` | `1.0` | convention | half a nat |
-//! | draft/curves.rs | `SAME_COST` | `1e-6` | convention | rounding |
 //! | draft/curves.rs | `HELD` | `1e3` | convention | holds a mean and leaves the sum regular |
 //! | draft/curves.rs | `RIDGE` | `1e-9` | convention | keeps 0 what the data do not show |
 //! | draft/curves.rs | `REFINEMENTS` | `8` | derived | `2^-8` of a step |

@@ -32,6 +32,8 @@ const FAR_AROUND: usize = 200;
 /// Least number of periods in the data; anything slower is a drift.
 const PERIODS_LEAST: f64 = 12.0;
 const LINES_MAX: usize = 3;
+/// Fewer frames have no spectrum.
+const FRAMES_LEAST: usize = 256;
 /// Parts of a recording through whose medians a drift goes.
 const DRIFT_PARTS: usize = 8;
 
@@ -115,7 +117,7 @@ struct Chosen {
 }
 
 impl Chosen {
-    /// `None` where a run is too short for a spectrum.
+    /// `None` where there are too few for a spectrum.
     fn of(frames: &Frames, is_chosen: impl Fn(usize) -> bool) -> Option<Self> {
         let interval_s = interval_s(frames);
         let mut begin = 0;
@@ -127,7 +129,7 @@ impl Chosen {
             begin = *end;
         }
         let (begin, end) = longest;
-        if end - begin < 256 {
+        if begin == end {
             return None;
         }
         let duration_s = frames.t_s[end - 1] - frames.t_s[begin];
@@ -143,6 +145,9 @@ impl Chosen {
         let size = (slot(end - 1) + 1).next_power_of_two().min(1 << 18);
         let chosen: Vec<usize> =
             (begin..end).filter(|frame| slot(*frame) < size && is_chosen(*frame)).collect();
+        if chosen.len() < FRAMES_LEAST {
+            return None;
+        }
         let step_hz = 1.0 / (size as f64 * interval_s);
         #[expect(
             clippy::cast_possible_truncation,

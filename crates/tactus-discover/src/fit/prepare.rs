@@ -102,9 +102,9 @@ impl<'a> Prepared<'a> {
             recalibrated(&Problem::new(Predictor::with_images(known, frames, bins, &images), &noise), &faulty)
         };
         let mut base = base_of(&bins)?;
-        let [lines, in_contact] =
+        let (lines, has_lines_in_contact) =
             lines(&Predictor::with_images(known, frames, &whole, &images), &base, &faulty)?;
-        if !lines.is_empty() || !in_contact.is_empty() {
+        if !lines.is_empty() || has_lines_in_contact {
             // Averaging over several frames would remove a tone.
             bins = Bins::of(frames, false)?;
             bins.weigh(frames, &noise, &heldout);
@@ -179,8 +179,8 @@ fn recalibrated(problem: &Problem<'_>, faulty: &Faulty) -> Result<Fitted, Discov
     problem.fit_from(start, BASE_ROUNDS)
 }
 
-/// Lines in the spectrum of a model's residual of all frames without contact, and of those in which the tip rests in contact.
-fn lines(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<[Vec<Line>; 2], DiscoverError> {
+/// Lines in the spectrum of a model's residual of the frames without contact, and whether those in which the tip rests in contact have any.
+fn lines(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<(Vec<Line>, bool), DiscoverError> {
     let predicted = whole.predict(&base.parameters)?;
     let mut residual: Vec<f64> =
         whole.frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
@@ -189,5 +189,6 @@ fn lines(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<[Vec<L
     }
     let columns = whole.known.array.cols();
     let without_contact = spectrum::lines(whole.frames, columns, &residual);
-    Ok([without_contact, spectrum::lines_in_contact(whole.frames, columns, &residual)])
+    let in_contact = spectrum::lines_in_contact(whole.frames, columns, &residual);
+    Ok((without_contact, !in_contact.is_empty()))
 }

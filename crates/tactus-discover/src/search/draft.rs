@@ -191,20 +191,16 @@ struct Field<'a> {
     count: f64,
 }
 
+/// The atom of a field that is tried as an effect.
+struct Best {
+    /// Its place among those that are weighed.
+    atom: usize,
+    ln_odds: f64,
+    /// Others that are as good, in words.
+    alike: Vec<String>,
+}
+
 impl Field<'_> {
-    /// Those that are as good as the first.
-    fn as_good(&self) -> Vec<(usize, f64)> {
-        as_good_as_first(&self.ranked)
-    }
-
-    /// Those that are as good and act on something else or by something else, in words.
-    fn alike(&self, best: usize) -> Vec<String> {
-        let others = self.as_good().into_iter().filter(|(one, _)| !self.is_like(*one, best));
-        let mut words: Vec<String> = others.map(|(one, _)| words::of_atom(&self.weighed[one].atom)).collect();
-        words.dedup();
-        words
-    }
-
     /// Leaves out an atom and all that act on the same by the same.
     fn leave_out(&mut self, best: usize) {
         let weighed = self.weighed;
@@ -247,41 +243,75 @@ impl Search<'_> {
         };
         let mut why = NoDraft::NoGain;
         for nth in 0..TRIED_MAX {
-            let Some((best, ln_odds)) = self.best(at, &sight, &field)? else { break };
-            let Atom { carrier, covariates, .. } = &field.weighed[best].atom;
+            let Some(best) = self.best(at, &sight, &field)? else { break };
+            let atom = best.atom;
+            let Atom { carrier, covariates, .. } = &field.weighed[atom].atom;
             if closed.contains(&carrier.stage(covariates)) {
                 return Ok(Err(NoDraft::OfAName));
             }
-            match self.drafted(at, &sight, &field, (best, ln_odds, p_value), (name, against))? {
+            match self.drafted(at, &sight, &field, (best, p_value), (name, against))? {
                 Ok(found) => return Ok(Ok(found)),
                 Err(other) if nth == 0 => why = other,
                 Err(_) => (),
             }
-            field.leave_out(best);
+            field.leave_out(atom);
         }
         Ok(Err(why))
     }
 
-    /// Of the atoms that are as good as the first those that are best with as many knots as the evidence carries, and of those that act on the
-    /// same by the same the one with the fewest numbers.
+    /// The best atom of a field. Of those that are as good as the first the one is best that is so with as many knots as the evidence carries, and of
+    /// those that act on the same by the same the one with the fewest numbers.
     fn best(
         &self,
         at: &Fitted,
         sight: &Arc<Sight>,
         field: &Field<'_>,
-    ) -> Result<Option<(usize, f64)>, DiscoverError> {
-        let mut as_good = field.as_good();
+    ) -> Result<Option<Best>, DiscoverError> {
+        let mut as_good = as_good_as_first(&field.ranked);
         let Some((first, _)) = as_good.first().copied() else { return Ok(None) };
+        let mut alike = Vec::new();
         if as_good.iter().any(|(one, _)| !field.is_like(*one, first)) {
             let fine = |one: usize| form::finer(&field.weighed[one].atom, sight);
             let (of, atoms): (Vec<usize>, Vec<Atom>) =
                 as_good.iter().flat_map(|(one, _)| fine(*one).into_iter().map(|atom| (*one, atom))).unzip();
-            let (weighed, grams) = self.products(at, sight, atoms)?;
-            let additions = additions(&weighed, &grams, field.count);
-            let ranked = ranked(&self.evidence_of(&additions, grams.reduced()));
-            as_good.retain(|(one, _)| ranked.first().is_none_or(|(best, _)| field.is_like(*one, of[*best])));
+            let ranked = self.ranked(at, sight, &atoms, field.count)?;
+            let first = of[ranked.first().map_or(0, |(place, _)| *place)];
+            let as_fine: Vec<usize> =
+                as_good_as_first(&ranked).into_iter().map(|(place, _)| of[place]).collect();
+            alike.extend(as_fine.into_iter().filter(|one| !field.is_like(*one, first)));
+            as_good.retain(|(one, _)| field.is_like(*one, first));
         }
-        Ok(as_good.into_iter().min_by_key(|(one, _)| field.weighed[*one].directions.len()))
+        let mut alike: Vec<String> =
+            alike.into_iter().map(|one| words::of_atom(&field.weighed[one].atom)).collect();
+        alike.dedup();
+        let best = as_good.into_iter().min_by_key(|(one, _)| field.weighed[*one].directions.len());
+        Ok(best.map(|(atom, ln_odds)| Best { atom, ln_odds, alike }))
+    }
+
+    /// Atoms with the logarithm of the odds of each by itself, greatest first, as one of so many; in as many passes as they take.
+    fn ranked(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atoms: &[Atom],
+        count: f64,
+    ) -> Result<Vec<(usize, f64)>, DiscoverError> {
+        let mut found: Vec<(usize, f64)> = Vec::new();
+        while found.len() < atoms.len() {
+            let first = found.len();
+            let mut columns = 0;
+            let fits = |atom: &&Atom| {
+                columns += atom.columns(sight.elements);
+                columns <= COLUMNS_MAX
+            };
+            let some = atoms[first..].iter().take_while(fits).count().max(1);
+            let (weighed, grams) = self.products(at, sight, atoms[first..first + some].to_vec())?;
+            let additions = additions(&weighed, &grams, count);
+            let evidence = self.evidence_of(&additions, grams.reduced());
+            found.extend(ranked(&evidence).into_iter().map(|(place, odds)| (first + place, odds)));
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        Ok(found)
     }
 
     /// The best atom of a field as a draft.
@@ -290,7 +320,7 @@ impl Search<'_> {
         at: &Fitted,
         sight: &Arc<Sight>,
         field: &Field<'_>,
-        (best, ln_odds, p_value): (usize, f64, f64),
+        (Best { atom: best, ln_odds, alike }, p_value): (Best, f64),
         (name, against): (&str, Against<'_>),
     ) -> Result<Outcome, DiscoverError> {
         let folds = self.folds(field, best);
@@ -324,7 +354,6 @@ impl Search<'_> {
         if ln_odds < AHEAD_LN_ODDS {
             return Ok(Err(NoDraft::NoGain));
         }
-        let alike = field.alike(best);
         let numbers = covariance.len() + draft.weights.as_ref().map_or(0, Vec::len);
         let ln_odds_as_chosen = self.ln_odds_of_numbers(at, &with, numbers) - field.count.ln();
         Ok(Ok(Box::new(Drafted {

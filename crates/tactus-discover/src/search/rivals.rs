@@ -247,6 +247,8 @@ struct Seen {
     /// For each bin: whether the tool touches, where the tip is on the sensor, how long its way was, and the largest signal.
     deep: Vec<bool>,
     place_mm: Vec<[f64; 2]>,
+    /// Direction of the last move aside, on the sensor.
+    heading: Vec<[f64; 2]>,
     travel_mm: Vec<f64>,
     largest: Vec<f64>,
 }
@@ -262,6 +264,11 @@ impl Seen {
         let elements = bins.elements;
         let history = forms.history();
         let places = history.place_mm[0].iter().zip(&history.place_mm[1]);
+        let origin = known.registration.to_sensor([0.0; 2]);
+        let turned = |heading: [f64; 2]| {
+            let end = known.registration.to_sensor(heading);
+            [end[0] - origin[0], end[1] - origin[1]]
+        };
         let largest = |signal: &[f64]| signal.iter().copied().fold(0.0, f64::max);
         let frames = problem.predictor.frames;
         let mut way_mm = 0.0;
@@ -277,6 +284,7 @@ impl Seen {
             centres_mm: (0..elements).filter_map(|element| known.array.centre_mm(element)).collect(),
             deep: history.depth_mm.iter().map(|depth_mm| *depth_mm > 0.0).collect(),
             place_mm: places.map(|(x, y)| known.registration.to_sensor([*x, *y])).collect(),
+            heading: history.heading.iter().map(|heading| turned(*heading)).collect(),
             travel_mm: bins.first[..bins.len()].iter().map(|frame| ways_mm[*frame]).collect(),
             largest: forms.signal().chunks_exact(elements).map(largest).collect(),
             forms,
@@ -308,7 +316,7 @@ impl Seen {
     /// How far the element is from the tip, along the direction of the last move aside.
     fn ahead_mm(&self, bin: usize, element: usize) -> f64 {
         let [x, y] = self.offset_from_tip_mm(bin, element);
-        let [along_x, along_y] = self.forms.history().heading[bin];
+        let [along_x, along_y] = self.heading[bin];
         x * along_x + y * along_y
     }
 

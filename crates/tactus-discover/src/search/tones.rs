@@ -54,7 +54,8 @@ pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone), per_unit_
     cells.clearest(per_unit_most, |_| true)
 }
 
-/// The clearest tone in time but at the rhythm at which presses come: there it is what every press repeats.
+/// The clearest tone in time but at the rhythm at which presses come: there it is what every press repeats. The pauses between readings tell the rhythm,
+/// so that there is none where readings go on, or where several runs lie over each other.
 pub(super) fn clearest_beside_rhythm(points: &(impl Iterator<Item = Point> + Clone)) -> Option<Tone> {
     let cells = Cells::of(points, CELLS)?;
     let starts = cells.starts();
@@ -98,7 +99,8 @@ impl Cells {
         let frequencies = PERIODS_LEAST..most.min(CELLS / CELLS_LEAST);
         let mut places: Vec<usize> = (FINER * frequencies.start..FINER * frequencies.end).collect();
         places.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
-        let best = places.into_iter().find(|place| is_allowed(*place))?;
+        let is_top = |place: usize| power[place] >= power[place - 1].max(power[place + 1]);
+        let best = places.into_iter().find(|place| is_top(*place) && is_allowed(*place))?;
         let periods = between(&series().collect::<Vec<f64>>(), best as f64 / FINER as f64);
         Some(Tone { per_unit: periods / range, among: frequencies.len() as f64 })
     }

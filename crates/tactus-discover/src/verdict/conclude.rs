@@ -67,11 +67,6 @@ pub(crate) fn conclude(
         exchanged: &exchanged,
     };
     let judged = judge.judged(confirmed)?;
-    let of_draft = match &judged.draft {
-        Some(Ok(found)) => corrected(found.p_value),
-        _ => 1.0,
-    };
-    let p_value = p_value.min(of_draft);
     search.reporter.tell("opening the held-out presses");
     let Opened { levels: [base_level, grown_level], closed, is_left, verdict } =
         judge.opened(&judged, &of_base)?;
@@ -118,6 +113,15 @@ pub(crate) fn conclude(
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
     let is_added = !names.is_empty() || prepared.converter.is_some();
     let share = share_unexplained(verdict, is_added, search.share_left(base, &grown));
+    let depends_on = match &draft {
+        _ if is_clean => Vec::new(),
+        _ if is_left => depends_on(&after, of_noise),
+        // No other test sees what a draft describes.
+        Some(Ok(found)) => found.draft.covariates.iter().map(|covariate| covariate.name()).collect(),
+        Some(Err(_)) | None => Vec::new(),
+    };
+    let gap = if is_left && !is_clean { after.gap.clone() } else { Vec::new() };
+    let unexplained = Unexplained { depends_on, gap, share };
     let ended_early = is_cut.then(|| ENDED_EARLY.to_owned());
     let of_search = few_presses.into_iter().chain(ended_early);
     let warnings =
@@ -139,11 +143,7 @@ pub(crate) fn conclude(
         final_: Final { level: grown_level, closed },
         verdict,
         draft,
-        unexplained: if is_left && !is_clean {
-            Unexplained { depends_on: depends_on(&after, of_noise), gap: after.gap.clone(), share }
-        } else {
-            Unexplained { depends_on: Vec::new(), gap: Vec::new(), share }
-        },
+        unexplained,
         plan,
         effects,
         grown: base_of(prepared, &grown.parameters),

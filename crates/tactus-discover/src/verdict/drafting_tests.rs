@@ -8,6 +8,7 @@ use tactus_model::{Covariate, Effect};
 use tactus_schema::table::Phase;
 
 use crate::fixtures::{ELEMENTS, found, known, measured, measured_along, processes};
+use crate::search::ALPHA;
 use crate::verdict::Closed;
 use crate::{
     Because, Confirmation, Discovery, DraftedEffect, Frames, GivenUp, Known, NoDraft, Verdict, confirm,
@@ -125,6 +126,23 @@ fn weights_that_scatter_by_a_tenth_are_drafted() {
     let off = |(element, got): (usize, &f64)| (got - 6.0 * weight(element)).powi(2);
     let rms = (got.iter().enumerate().map(off).sum::<f64>() / got.len() as f64).sqrt();
     assert!(rms < 0.3, "{rms} of 0.6 that they scatter by: {got:?}");
+}
+
+/// One element answers more where it is pressed deep: the other tests, which look at all elements together, do not see it.
+#[test]
+fn what_drafts_alone_see_is_no_clean_model() {
+    let more = |rises: &[f64], _, element: usize| {
+        if element == 27 { 0.1 * (rises[element] - 60.0).max(0.0) } else { 0.0 }
+    };
+    let (known, frames) = with(more);
+    let found = found(&known, &frames);
+    let others = found.global.unwrap().p_value;
+    let draft = &drafted(&found).draft;
+    assert!(others > ALPHA, "{others}");
+    assert_eq!((names(&found), found.verdict), (vec![], Verdict::Unexplained));
+    assert_eq!(draft.carrier, Carrier::OwnSignal, "{}", draft.sentence);
+    let depends_on: Vec<&str> = draft.covariates.iter().map(|one| one.name()).collect();
+    assert_eq!(found.unexplained.depends_on, depends_on);
 }
 
 /// Where the tip rests frames are averaged, but not over a tone.

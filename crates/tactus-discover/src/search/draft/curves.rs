@@ -11,7 +11,6 @@
 //! it in the fit, which is dropped where that costs nothing. A curve becomes the law that costs least if that is less than a form may miss and noise
 //! makes it miss; else it stays a table.
 
-use std::cmp::Ordering;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
@@ -21,10 +20,8 @@ use super::grammar::{self, Atom};
 
 /// Shapes that are tried between the least and the greatest length of a law.
 const SHAPES: usize = 60;
-/// A constant beside a law is dropped if that costs less.
+/// A constant beside a law is dropped if that costs less, and the simpler of two laws taken.
 const FREE_COST: f64 = 1.0;
-/// Two laws cost the same that differ by less.
-const SAME_COST: f64 = 1e-6;
 /// A held mean weighs so much more than a knot.
 const HELD: f64 = 1e3;
 /// A prior so wide that it only keeps what the data do not show at 0.
@@ -132,13 +129,7 @@ pub(super) fn reduced(atom: &Atom, curve: &Curve, missed: f64) -> Reduced {
         let knots = places.iter().zip(curve.values.iter()).enumerate();
         knots.map(|(knot, (at, value))| [*at, value + shift, errors[knot]]).collect()
     };
-    let of = |(kind, shape): (Kind, f64)| Some((fitted(places, curve, kind, shape)?, kind, shape));
-    let decays = grammar::is_near_an_event(atom.covariates[0]);
-    let cheaper = |one: f64, other: f64| {
-        if (one - other).abs() < SAME_COST { Ordering::Equal } else { one.total_cmp(&other) }
-    };
-    let best = candidates(places, decays).filter_map(of).min_by(|a, b| cheaper(a.0.0, b.0.0));
-    let best = best.map(|(best, kind, shape)| refined(places, curve, kind, shape, best));
+    let best = best_law(places, curve, grammar::is_near_an_event(atom.covariates[0]));
     if let Some((_, law, columns)) = best.filter(|(cost, law, _)| 0.5 * curve.excess(*cost, law) <= missed) {
         let shift = if held_gram.is_some() { curve.shift_to(places, &law) } else { 0.0 };
         return Reduced { covariance: covariance(&curve.gram, &columns), law, knots: knots_by(shift) };
@@ -150,29 +141,34 @@ pub(super) fn reduced(atom: &Atom, curve: &Curve, missed: f64) -> Reduced {
     Reduced { law, covariance: all, knots: knots_by(shift) }
 }
 
-/// Laws with a shape, for covariates with these knots. Of laws that cost the same the first is taken: a straight line; and of two that differ by a
-/// constant that nothing shows the one that is over in time, if the covariate is that since an event (`decays`), else the one that begins at 0.
-fn candidates(places: &[f64], decays: bool) -> impl Iterator<Item = (Kind, f64)> + '_ {
+/// The law that costs least. Of those that hardly cost more the first is taken: a straight line; and of two that differ by a constant that nothing
+/// shows the one that is over in time, if the covariate is that since an event (`decays`), else the one that begins at 0.
+fn best_law(places: &[f64], curve: &Curve, decays: bool) -> Option<Priced> {
     let (least, most) = (places[0], places[places.len() - 1]);
-    let positive = least >= 0.0;
-    let lengths =
-        (0..SHAPES).map(move |step| (most - least) * 0.02 * 250.0_f64.powf(step as f64 / SHAPES as f64));
-    let exponents = (1..=SHAPES).map(|step| 0.1 * step as f64);
+    let lengths: Vec<f64> =
+        (0..SHAPES).map(|step| (most - least) * 0.02 * 250.0_f64.powf(step as f64 / SHAPES as f64)).collect();
+    let exponents: Vec<f64> = (1..=SHAPES).map(|step| 0.1 * step as f64).collect();
+    let between: Vec<f64> = places.windows(2).map(|two| f64::midpoint(two[0], two[1])).collect();
+    let linear: Kind = |scale, _| Law::Linear { offset: 0.0, slope: scale };
+    let power: Kind = |scale, exponent| Law::Power { scale, exponent };
     let exponential: Kind = |scale, length| Law::Exponential { scale, length };
     let saturating: Kind = |scale, length| Law::Saturating { scale, length };
     let logarithm: Kind = |scale, length| Law::Logarithm { scale, length };
-    let power: Kind = |scale, exponent| Law::Power { scale, exponent };
     let threshold: Kind = |scale, at| Law::Threshold { scale, at };
-    let linear: Kind = |scale, _| Law::Linear { offset: 0.0, slope: scale };
-    let of_lengths = lengths.filter(move |_| positive);
-    let between = places.windows(2).map(|two| f64::midpoint(two[0], two[1]));
-    std::iter::once((linear, 1.0))
-        .chain(exponents.filter(move |_| positive).map(move |shape| (power, shape)))
-        .chain(of_lengths.flat_map(move |shape| {
-            let [first, second] = if decays { [exponential, saturating] } else { [saturating, exponential] };
-            [(first, shape), (second, shape), (logarithm, shape)]
-        }))
-        .chain(between.map(move |at| (threshold, at)))
+    let [first, second] = if decays { [exponential, saturating] } else { [saturating, exponential] };
+    let mut kinds: Vec<(Kind, &[f64])> = vec![(linear, &[1.0])];
+    if least >= 0.0 {
+        kinds.extend([(power, &*exponents), (first, &*lengths), (second, &*lengths), (logarithm, &*lengths)]);
+    }
+    kinds.push((threshold, &*between));
+    let of_kind = |(kind, shapes): (Kind, &[f64])| {
+        let priced = shapes.iter().filter_map(|shape| Some((fitted(places, curve, kind, *shape)?, *shape)));
+        let (best, shape) = priced.min_by(|a, b| a.0.0.total_cmp(&b.0.0))?;
+        Some(refined(places, curve, kind, shape, best))
+    };
+    let laws: Vec<Priced> = kinds.into_iter().filter_map(of_kind).collect();
+    let least = laws.iter().map(|law| law.0).fold(f64::INFINITY, f64::min);
+    laws.into_iter().find(|law| law.0 < least + FREE_COST)
 }
 
 /// The same law with the shape between the tried ones that costs least.

@@ -1,7 +1,7 @@
 //! The form of a draft: knots, weights, a second covariate and a law, each as far as the data show it.
 //!
 //! An atom that won has a coarse curve: enough to tell what acts on what. Here its curve gets as many knots as the evidence carries, its elements get
-//! weights, and a second covariate comes beside the first, where that gains more than a form may miss, and holds for presses that had no part in it. The curve becomes a law if one
+//! weights, and a second covariate comes beside the first, where that gains more than a form may miss, and holds for presses that had no part in it, taken together. The curve becomes a law if one
 //! passes through it as nearly. Then the draft is fitted as an effect, which moves all else, and its curve is made once more where the others are
 //! then: what a model without the draft predicts is what it acts on, and until then that had taken up a part of it.
 
@@ -13,9 +13,7 @@ use tactus_model::effect::{Carrier, Draft};
 
 use super::grammar::Atom;
 use super::sight::Sight;
-use super::{
-    COLUMNS_MAX, KNOTS, KNOTS_OF_SECOND, additions, as_good_as_first, curves, grammar, ranked, words,
-};
+use super::{COLUMNS_MAX, KNOTS, KNOTS_OF_SECOND, additions, as_good_as_first, curves, grammar, words};
 use crate::data::DiscoverError;
 use crate::fit::{FOLDS, Fitted, Grams, Term};
 use crate::search::evidence::Addition;
@@ -57,9 +55,11 @@ impl Search<'_> {
         let without = self.without_last(&first.at)?;
         let sight = Arc::new(Sight::of(self.problem, &without)?);
         let atom = grammar::picked_anew(atom, self.problem, &without, &sight);
-        let again = self.in_form(&without, &sight, &atom, name, first.at.cost)?;
-        let unseen_gains = first.unseen_gains.clone();
-        Ok(Some(again.map_or(first, |again| AsEffect { unseen_gains, ..again })))
+        Ok(Some(match self.in_form(&without, &sight, &atom, name, first.at.cost)? {
+            // What it gains on unseen presses is beside the model without it as it was fitted.
+            Some(again) => AsEffect { unseen_gains: first.unseen_gains, ..again },
+            None => first,
+        }))
     }
 
     /// The atom with the knots, the weights and the second covariate that the data show.
@@ -72,49 +72,48 @@ impl Search<'_> {
     ) -> Result<Atom, DiscoverError> {
         if atom.of_elements {
             let coarse = self.with_weights(at, sight, atom)?;
-            let fine = self.with_best_knots(at, sight, finer(&coarse, sight))?;
-            let shared = self.curve(at, sight, &fine)?.shared();
-            return self.with_weights(at, sight, Atom { of_elements: true, curve: shared, ..fine });
+            let fine = self.with_best_knots(at, sight, &finer(&coarse, sight))?;
+            let Some(shared) = self.curve(at, sight, &fine)?.shared() else { return Ok(coarse) };
+            return self.with_weights(at, sight, Atom { of_elements: true, curve: Some(shared), ..fine });
         }
-        let fine = self.with_best_knots(at, sight, finer(&atom, sight))?;
+        let fine = self.with_best_knots(at, sight, &finer(&atom, sight))?;
         let weights = self.weights_beside(at, sight, &fine)?;
         let second = self.second_beside(at, sight, &fine, &atom, among)?;
         let weighted = |atom: Atom, weights| Atom { weights: Some(weights), ..atom };
         match (weights, second) {
             (None, None) => Ok(fine),
             (Some((_, weights)), None) => Ok(weighted(fine, weights)),
-            (None, Some((_, both))) => self.with_best_knots(at, sight, finer_of_both(&both, &fine, sight)),
+            (None, Some((_, both))) => self.with_best_knots(at, sight, &finer_of_both(&both, fine, sight)),
             (Some((by_weights, weights)), Some((by_second, _))) if by_weights >= by_second => {
                 let (fine, coarse) = (weighted(fine, Arc::clone(&weights)), weighted(atom, weights));
                 match self.second_beside(at, sight, &fine, &coarse, among)? {
-                    Some((_, both)) => self.with_best_knots(at, sight, finer_of_both(&both, &fine, sight)),
+                    Some((_, both)) => self.with_best_knots(at, sight, &finer_of_both(&both, fine, sight)),
                     None => Ok(fine),
                 }
             }
             (Some(_), Some((_, both))) => {
-                let both = self.with_best_knots(at, sight, finer_of_both(&both, &fine, sight))?;
-                let weights = self.weights_beside(at, sight, &both)?;
-                Ok(weights.map_or(both.clone(), |(_, weights)| weighted(both, weights)))
+                let both = self.with_best_knots(at, sight, &finer_of_both(&both, fine, sight))?;
+                Ok(match self.weights_beside(at, sight, &both)? {
+                    Some((_, weights)) => weighted(both, weights),
+                    None => both,
+                })
             }
         }
     }
 
-    /// Of atoms that differ in their knots alone the one that the data prefer.
+    /// Of forms of one atom the one that the data prefer, and of those that are as good the one with the fewest numbers.
     fn with_best_knots(
         &self,
         at: &Fitted,
         sight: &Arc<Sight>,
-        atoms: Vec<Atom>,
+        atoms: &[Atom],
     ) -> Result<Atom, DiscoverError> {
-        let [only] = atoms.as_slice() else {
-            let (weighed, grams) = self.products(at, sight, atoms)?;
-            let additions = additions(&weighed, &grams, 1.0);
-            let ranked = ranked(&self.evidence_of(&additions, grams.reduced()));
-            let as_good = as_good_as_first(&ranked).into_iter();
-            let best = as_good.min_by_key(|(one, _)| weighed[*one].directions.len());
-            return Ok(weighed[best.map_or(0, |(one, _)| one)].atom.clone());
-        };
-        Ok(only.clone())
+        if let [only] = atoms {
+            return Ok(only.clone());
+        }
+        let ranked = self.ranked(at, sight, atoms, 1.0)?;
+        let as_good = as_good_as_first(&ranked).into_iter().map(|(place, _)| &atoms[place]);
+        Ok(as_good.min_by_key(|atom| atom.columns(sight.elements)).unwrap_or(&atoms[0]).clone())
     }
 
     /// The atom with a second covariate and what that gains beside the fine curve of the first one, if it is more than a form may miss.
@@ -127,23 +126,22 @@ impl Search<'_> {
         among: f64,
     ) -> Result<Gained<Atom>, DiscoverError> {
         let seconds: Vec<Atom> = grammar::with_seconds(coarse, sight).collect();
-        let Some(each) = seconds.first().map(|second| second.columns(sight.elements)) else {
-            return Ok(None);
-        };
-        let mut best: Gained<Atom> = None;
+        let each = seconds.iter().map(|second| second.columns(sight.elements)).max().unwrap_or(1);
         let room = COLUMNS_MAX.saturating_sub(fine.columns(sight.elements));
+        let mut best: Gained<Atom> = None;
         for some in seconds.chunks((room / each).max(1)) {
             let atoms = std::iter::once(fine).chain(some).cloned().collect();
             let (weighed, grams) = self.products(at, sight, atoms)?;
             let additions = additions(&weighed, &grams, among * seconds.len() as f64);
             let evidence = self.evidence_of(&additions, grams.reduced());
             let first = evidence.set([0]);
-            let gains = (1..weighed.len()).map(|second| (evidence.gain(&first, second).ln_odds, second));
-            let Some((gain, second)) = gains.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
-            let is_best = best.as_ref().is_none_or(|(most, _)| gain > *most);
-            if is_best && gain > missed(first.ln_odds) && self.holds(&grams, &additions, [0, second]) {
-                best = Some((gain, weighed[second].atom.clone()));
-            }
+            let least = best.as_ref().map_or(missed(first.ln_odds), |(gain, _)| *gain);
+            let gain = |second: usize| (evidence.gain(&first, second).ln_odds, second);
+            let mut gains: Vec<(f64, usize)> = (1..weighed.len()).map(gain).collect();
+            gains.retain(|(gain, _)| *gain > least);
+            gains.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let held = gains.into_iter().find(|(_, second)| self.holds(&grams, &additions, [0, *second]));
+            best = held.map(|(gain, second)| (gain, weighed[second].atom.clone())).or(best);
         }
         Ok(best)
     }
@@ -271,12 +269,11 @@ impl Search<'_> {
 
     /// A model as it is fitted, without its last term.
     fn without_last(&self, with: &Fitted) -> Result<Fitted, DiscoverError> {
-        let mut without = with.clone();
-        without.parameters.terms.pop();
-        without.errors.pop();
-        without.predicted = self.problem.predict(&without.parameters)?;
-        without.cost = self.problem.cost(&without.predicted);
-        Ok(without)
+        let mut parameters = with.parameters.clone();
+        parameters.terms.pop();
+        let predicted = self.problem.predict(&parameters)?;
+        let (cost, errors) = (self.problem.cost(&predicted), with.errors[..parameters.terms.len()].to_vec());
+        Ok(Fitted { parameters, predicted, cost, errors })
     }
 }
 
@@ -296,21 +293,15 @@ pub(super) fn finer(atom: &Atom, sight: &Sight) -> Vec<Atom> {
     atoms
 }
 
-/// An atom of two covariates, and with the fine knots of the first one, with more of the second, and with both, as far as a pass takes them.
-fn finer_of_both(both: &Atom, fine: &Atom, sight: &Sight) -> Vec<Atom> {
-    let second = (both.carrier, both.when, both.covariates[1]);
-    let more = sight.knots(second, FINER_OF_SECOND * KNOTS_OF_SECOND);
-    let mut columns = both.columns(sight.elements);
-    let mut atoms = vec![both.clone()];
-    for first in [&both.knots[0], &fine.knots[0]] {
-        for second in [&both.knots[1], &more] {
-            let knots = vec![first.clone(), second.clone()];
-            let finer = Atom { knots, ..both.clone() };
-            let of_it = finer.columns(sight.elements);
-            if columns + of_it <= COLUMNS_MAX && atoms.iter().all(|known| known.knots != finer.knots) {
-                columns += of_it;
-                atoms.push(finer);
-            }
+/// An atom of one covariate, and with a second one: with the knots of the grammar, with more of either, and of both.
+fn finer_of_both(both: &Atom, fine: Atom, sight: &Sight) -> Vec<Atom> {
+    let more =
+        |place: usize, count: usize| sight.knots((both.carrier, both.when, both.covariates[place]), count);
+    let [first, second] = [more(0, FINER[0] * KNOTS), more(1, FINER_OF_SECOND * KNOTS_OF_SECOND)];
+    let mut atoms = vec![fine];
+    for first in [&both.knots[0], &first] {
+        for second in [&both.knots[1], &second] {
+            atoms.push(Atom { knots: vec![first.clone(), second.clone()], ..both.clone() });
         }
     }
     atoms

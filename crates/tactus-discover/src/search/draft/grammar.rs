@@ -234,8 +234,8 @@ pub(super) fn atoms(problem: &Problem<'_>, at: &Fitted, sight: &Sight, rounds: b
     found
 }
 
-/// A jump or a tone where the residual at this model has it, with the weights that it has; any other atom as it is.
-pub(super) fn picked_anew(atom: Atom, problem: &Problem<'_>, at: &Fitted, sight: &Sight) -> Atom {
+/// A jump or a tone where the residual at this model has it, as if all elements had the same weight; any other atom as it is.
+pub(super) fn picked_anew(mut atom: Atom, problem: &Problem<'_>, at: &Fitted, sight: &Sight) -> Atom {
     let acting = (atom.carrier, atom.when, atom.covariates[0]);
     let left = || Left::of(problem, at);
     let anew = match (atom.is_jump, atom.per_unit) {
@@ -243,7 +243,12 @@ pub(super) fn picked_anew(atom: Atom, problem: &Problem<'_>, at: &Fitted, sight:
         (_, Some(_)) => tone(&left(), sight, acting),
         (false, None) => None,
     };
-    anew.map_or(atom.clone(), |anew| Atom { weights: atom.weights, ..anew })
+    if let Some(Atom { knots, per_unit, .. }) = anew {
+        // Of a jump with a second covariate the first knots alone.
+        atom.knots.iter_mut().zip(knots).for_each(|(own, anew)| *own = anew);
+        atom.per_unit = per_unit;
+    }
+    atom
 }
 
 /// What a model leaves, reading by reading.
