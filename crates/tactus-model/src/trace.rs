@@ -37,7 +37,7 @@ pub struct Trace {
     pub travel_mm: f64,
     /// Direction of the last sideways move along x and y: -1, 0 or 1.
     pub aside: [f64; 2],
-    /// Direction of that move as a vector of length 1; 0 before the first.
+    /// Direction of the last sideways move as a vector of length 1; 0 before the first.
     pub heading: [f64; 2],
     /// Number of contacts so far.
     pub presses: f64,
@@ -134,14 +134,14 @@ impl Trace {
             }
         }
         let aside: [f64; 2] = std::array::from_fn(|axis| position_mm[axis] - self.position_mm[axis]);
-        let moved_mm = aside[0].hypot(aside[1]).max(fell_mm.abs());
+        let along_mm = aside[0].hypot(aside[1]);
+        let moved_mm = along_mm.max(fell_mm.abs());
         self.travel_mm_per_s = moved_mm / dt_s;
-        self.travel_mm += aside[0].hypot(aside[1]).hypot(fell_mm);
+        self.travel_mm += along_mm.hypot(fell_mm);
         let is_moving = moved_mm > STILL_MM_PER_S * dt_s;
         if self.is_moving != is_moving {
             (self.is_moving, self.turn_s) = (is_moving, t_s);
         }
-        let along_mm = aside[0].hypot(aside[1]);
         if along_mm > ASIDE_MM_PER_S * dt_s {
             self.heading = aside.map(|moved| moved / along_mm);
         }

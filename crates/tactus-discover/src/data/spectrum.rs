@@ -73,8 +73,9 @@ pub(crate) fn lines(frames: &Frames, columns: usize, residual: &[f64]) -> Vec<Li
         }
     }
     let of_powers = |at: usize| clearness(power[at], &power[around(at, AROUND, power.len())]) / STANDS_OUT;
-    let mut peaks = idle.peaks(&power, &idle.rhythm(), 0.0, of_powers);
-    peaks.extend(idle.of_columns(sums));
+    let rhythm = idle.rhythm();
+    let mut peaks = idle.peaks(&power, &rhythm, 0.0, of_powers);
+    peaks.extend(idle.of_columns(sums, &rhythm));
     clearest(peaks)
 }
 
@@ -89,7 +90,7 @@ pub(crate) fn lines_in_contact(frames: &Frames, columns: usize, residual: &[f64]
         let values = resting.of_element(element, frames.elements, residual);
         sums[element % columns].iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
     }
-    clearest(resting.of_columns(sums))
+    clearest(resting.of_columns(sums, &resting.rhythm()))
 }
 
 /// The clearest of some peaks that are not neighbours.
@@ -174,13 +175,12 @@ impl Chosen {
         self.spectrum(&vec![1.0; self.frames.len()]).into_iter().map(squared).collect()
     }
 
-    /// Peaks of the sums of columns, each a phase further than the one before.
-    fn of_columns(&self, mut sums: Vec<Vec<f64>>) -> Vec<Peak> {
+    /// Peaks of the sums of columns, each a phase further than the one before, but at the rhythm.
+    fn of_columns(&self, mut sums: Vec<Vec<f64>>, rhythm: &[f64]) -> Vec<Peak> {
         // What all elements have from stretch to stretch leaks far.
         for sum in &mut sums {
             self.take_off_means(sum);
         }
-        let rhythm = self.rhythm();
         let of_columns: Vec<Vec<[f64; 2]>> = sums.iter().map(|sum| self.spectrum(sum)).collect();
         let phases = PHASES_PER_COLUMN * sums.len();
         let nats = (self.size as f64 / 2.0 * phases as f64 * RECORDINGS_PER_FALSE_LINE).ln();
@@ -193,7 +193,7 @@ impl Chosen {
                 let middle = |reach| median(&together[around(at, reach, together.len())]);
                 LN_2 * together[at] / middle(AROUND).max(middle(FAR_AROUND)).max(f64::MIN_POSITIVE) / nats
             };
-            self.peaks(&together, &rhythm, phase.to_degrees(), of_sum)
+            self.peaks(&together, rhythm, phase.to_degrees(), of_sum)
         };
         (0..phases).flat_map(of_phase).collect()
     }

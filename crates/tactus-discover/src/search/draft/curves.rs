@@ -35,8 +35,6 @@ pub(super) struct Curve {
     pub(super) gram: DMatrix<f64>,
     /// How many of the values the data determine, and not the prior.
     pub(super) determined: f64,
-    /// By how much a curve that is fitted to the other folds is nearer to the presses of each, block by block.
-    pub(super) unseen_gains: Vec<f64>,
 }
 
 /// A curve as a law or a table.

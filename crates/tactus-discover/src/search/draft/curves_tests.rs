@@ -15,7 +15,6 @@ fn curve(law: &Law, error: f64) -> Curve {
         values: DVector::from_iterator(AT.len(), AT.iter().map(|at| law.value(&[*at]))),
         gram: DMatrix::identity(AT.len(), AT.len()) / (error * error),
         determined: 0.0,
-        unseen_gains: Vec::new(),
     }
 }
 
@@ -66,7 +65,6 @@ fn fine_knots_may_miss_their_law_by_their_noise() {
         values: DVector::from_iterator(28, places.iter().map(|at| law.value(&[*at]) + noise())),
         gram: DMatrix::identity(28, 28) / (error * error),
         determined,
-        unseen_gains: Vec::new(),
     };
     assert_eq!(reduced(&fine, &one(28.0), 5.0).law.name(), "exponential");
     assert_eq!(

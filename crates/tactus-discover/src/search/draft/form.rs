@@ -11,6 +11,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::{Carrier, Draft};
 
+use super::curves::Curve;
 use super::grammar::Atom;
 use super::sight::Sight;
 use super::{COLUMNS_MAX, KNOTS, KNOTS_OF_SECOND, additions, as_good_as_first, curves, grammar, words};
@@ -185,21 +186,34 @@ impl Search<'_> {
     }
 
     /// The coefficients of an atom's columns with the greatest posterior probability.
-    fn curve(&self, at: &Fitted, sight: &Arc<Sight>, atom: &Atom) -> Result<curves::Curve, DiscoverError> {
+    fn curve(&self, at: &Fitted, sight: &Arc<Sight>, atom: &Atom) -> Result<Curve, DiscoverError> {
+        let (additions, grams) = self.alone(at, sight, atom)?;
+        Ok(self.curve_of(&additions, &grams))
+    }
+
+    /// An atom as the only addition, with its products.
+    fn alone(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atom: &Atom,
+    ) -> Result<(Vec<Addition>, Grams), DiscoverError> {
         let (weighed, grams) = self.products(at, sight, vec![atom.clone()])?;
-        let additions = additions(&weighed, &grams, 1.0);
-        let evidence = self.evidence_of(&additions, grams.reduced());
+        Ok((additions(&weighed, &grams, 1.0), grams))
+    }
+
+    fn curve_of(&self, additions: &[Addition], grams: &Grams) -> Curve {
+        let evidence = self.evidence_of(additions, grams.reduced());
         let set = evidence.set([0]);
         let found: BTreeMap<usize, f64> = evidence.coefficients(&set).into_iter().collect();
         let directions = &additions[0].directions;
         let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
         let product = |i: usize, j: usize| grams.reduced()[(directions[i], directions[j])];
-        Ok(curves::Curve {
-            unseen_gains: self.unseen_gains(&grams, &additions, &[0]),
+        Curve {
             values: DVector::from_iterator(directions.len(), directions.iter().map(value)),
             gram: DMatrix::from_fn(directions.len(), directions.len(), product) / self.problem.variance,
             determined: evidence.determined(&set),
-        })
+        }
     }
 
     /// By how much additions that are fitted to the other folds are nearer to the presses of each, block by block.
@@ -228,14 +242,15 @@ impl Search<'_> {
         name: &str,
         cost: f64,
     ) -> Result<Option<AsEffect>, DiscoverError> {
-        let curve = self.curve(at, sight, atom)?;
+        let (additions, grams) = self.alone(at, sight, atom)?;
+        let curve = self.curve_of(&additions, &grams);
         let reduced = curves::reduced(atom, &curve, missed(0.5 * curve.squares()));
         let draft = words::named(sight, atom, reduced.law, name);
         Ok(self.taken(at, draft, cost)?.map(|(draft, fitted, by)| AsEffect {
             draft,
             at: fitted,
             covariance: scaled(reduced.covariance, by * by),
-            unseen_gains: curve.unseen_gains,
+            unseen_gains: self.unseen_gains(&grams, &additions, &[0]),
             knots: reduced.knots.into_iter().map(|[at, value, error]| [at, by * value, by * error]).collect(),
         }))
     }
@@ -280,7 +295,9 @@ impl Search<'_> {
 /// The atom, and with more knots, as far as the readings have places for them.
 pub(super) fn finer(atom: &Atom, sight: &Sight) -> Vec<Atom> {
     let mut atoms = vec![atom.clone()];
-    if let ([places], [covariate], false) = (atom.knots.as_slice(), atom.covariates.as_slice(), atom.is_jump)
+    // A jump has its place, and a curve that the elements share its knots.
+    let is_fixed = atom.is_jump || atom.curve.is_some();
+    if let ([places], [covariate], false) = (atom.knots.as_slice(), atom.covariates.as_slice(), is_fixed)
         && places.len() > 1
     {
         for times in FINER {
