@@ -313,14 +313,40 @@ fn a_service_that_starts_again_gets_a_new_file_from_its_first_frame_on() {
     assert_eq!(code, Some(0), "{said}");
     collector.wait_for("left: gone");
 
+    let rig = host.folder.path().join("rig.toml");
+    let other_covering =
+        fs::read_to_string(&rig).unwrap().replacen("thickness_mm = 1.016", "thickness_mm = 2.54", 1);
+    fs::write(&rig, other_covering).unwrap();
     let _daemon = host.serve();
     collector.wait_for("started again");
     wait_until_collected(folder.path(), "left", host.wait_for_frames(30));
     let (code, totals) = ended(collector, "left");
     let files = recordings(&folder.path().join("collected/left"));
     assert_eq!((code, files.len(), &totals["frames_lost"]), (Some(0), 2, &0.into()), "{totals}");
+    let coverings_mm = files.iter().map(|file| Timeline::read(file).unwrap().rig().covering.thickness_mm);
+    assert_eq!(coverings_mm.collect::<Vec<_>>(), [1.016, 2.54], "each file has the rig of its service");
+    assert_eq!(totals["restarts"], 1, "{totals}");
     let (seqs, lost) = recorded(&files[1..]);
     assert_eq!((seqs[0], missing(&seqs), lost), (0, 0, 0), "{seqs:?}");
+}
+
+#[test]
+fn a_collector_that_starts_again_records_no_frame_twice() {
+    let runtime = Runtime::new().unwrap();
+    let (_router, router) = router(&runtime);
+    let folder = TempDir::new().unwrap();
+    let host = Host::new("left", &router, 1_800);
+    let _daemon = host.serve();
+    for _ in 0..2 {
+        let mut collector = collect(folder.path(), &router, &[]);
+        collector.wait_for("left: found");
+        wait_until_collected(folder.path(), "left", host.wait_for_frames(30));
+        let (code, totals) = ended(collector, "left");
+        assert_eq!(code, Some(0), "{totals}");
+    }
+    let files = recordings(&folder.path().join("collected/left"));
+    let (seqs, lost) = recorded(&files);
+    assert_eq!((files.len(), missing(&seqs), lost), (2, 0, 0), "what was sent between the two is still kept");
 }
 
 #[test]

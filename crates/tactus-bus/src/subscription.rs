@@ -213,7 +213,7 @@ impl<M: Published> Subscription<M> {
         self.gap.as_ref()
     }
 
-    /// Publishers of the messages so far: a rig that starts again, alone or with its service, has another one.
+    /// Publishers of the messages so far: a service that starts again has others. A rig that starts again alone, within its service, keeps them.
     pub fn publishers(&self) -> usize {
         self.publishers
     }

@@ -38,6 +38,7 @@ use std::thread;
 
 use clap::{CommandFactory, Parser};
 use tactus_bus::{BusConfig, BusError, CommandCall, Node, TlsConfig};
+use tactus_device::Clock;
 use tactus_log::LogFormat;
 use tactus_runner::config::{ConfigError, ServiceConfig, TlsSection};
 use tactus_runner::script_process::ScriptProcesses;
@@ -189,6 +190,7 @@ async fn serve(mut config: ServiceConfig) -> Result<(), ServiceError> {
         standings: Standings::default(),
         runs: Runs::default(),
         open: Box::new(|rig, service, codec, truth, clock| devices::open(rig, service, codec, truth, clock)),
+        clock: Clock::real(),
         evaluator: Arc::new(ScriptProcesses::of_this_program()),
         ending,
     });

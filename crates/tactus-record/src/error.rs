@@ -22,8 +22,8 @@ pub enum RecordError {
     /// The file is not where it was while it is being written.
     #[error("{} was deleted, moved or replaced while it was written: what is recorded is lost", path.display())]
     Vanished { path: PathBuf },
-    /// The disk has too little space for a run.
-    #[error("too little space for a run in {}: {} are free, {} are needed: delete what is not needed, or set `recordings` to a folder on another disk", folder.display(), in_mib(*free_bytes), in_mib(*needed_bytes))]
+    /// The disk has too little space for a recording.
+    #[error("too little space for a recording in {}: {} are free, {} are needed: delete what is not needed, or name a folder on another disk (`recordings` in a service's configuration, `--out` of a command)", folder.display(), in_mib(*free_bytes), in_mib(*needed_bytes))]
     NoSpace { folder: PathBuf, needed_bytes: u64, free_bytes: u64 },
     /// The file does not begin as an MCAP file does.
     #[error("{} is not an MCAP file", path.display())]

@@ -17,7 +17,10 @@ pub struct Tally {
     frames_unaccounted: u64,
     gaps: u64,
     last_seq: Option<u64>,
-    dwells: BTreeSet<(i32, u32)>,
+    /// Runs in the order of their first dwell: a collection has several.
+    runs: Vec<String>,
+    /// Run, press and number of each dwell of a press.
+    dwells: BTreeSet<(usize, i32, u32)>,
     dwells_outside: u32,
     span: Option<(MonoTime, MonoTime)>,
     finished: Option<pb::RunFinished>,
@@ -55,12 +58,21 @@ impl Tally {
         match &event.event {
             // A press that was begun again repeats its dwells: each counts once.
             Some(Event::DwellDone(dwell)) if dwell.press >= 0 => {
-                self.dwells.insert((dwell.press, dwell.dwell));
+                let run = self.run(&event.run_id);
+                self.dwells.insert((run, dwell.press, dwell.dwell));
             }
             Some(Event::DwellDone(_)) => self.dwells_outside += 1,
             Some(Event::Finished(finished)) => self.finished = Some(finished.clone()),
             _ => {}
         }
+    }
+
+    /// Index of a run among those that have dwells.
+    fn run(&mut self, id: &str) -> usize {
+        self.runs.iter().position(|run| run == id).unwrap_or_else(|| {
+            self.runs.push(id.to_owned());
+            self.runs.len() - 1
+        })
     }
 
     /// Extends the duration to the time of a message.
@@ -93,7 +105,7 @@ impl Tally {
 
     /// Number of presses with at least one completed dwell.
     pub fn presses(&self) -> u32 {
-        let presses: BTreeSet<i32> = self.dwells.iter().map(|(press, _)| *press).collect();
+        let presses: BTreeSet<_> = self.dwells.iter().map(|(run, press, _)| (run, press)).collect();
         u32::try_from(presses.len()).unwrap_or(u32::MAX)
     }
 

@@ -53,6 +53,15 @@ fn a_repeated_frame_is_no_loss() {
 }
 
 #[test]
+fn presses_of_two_runs_are_two_although_their_numbers_are_one() {
+    let mut tally = Tally::default();
+    for run in ["one", "two", "one"] {
+        tally.event(&pb::RunEvent { run_id: run.into(), ..dwell(0, 0) });
+    }
+    assert_eq!((tally.presses(), tally.dwells()), (2, 2));
+}
+
+#[test]
 fn a_repeated_press_counts_its_dwells_once() {
     let mut tally = Tally::default();
     for (press, nth) in [(0, 0), (0, 1), (1, 0), (1, 0), (1, 1), (-1, 0), (-1, 0)] {

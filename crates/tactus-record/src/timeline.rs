@@ -1,6 +1,7 @@
 //! Position and phase of the stage at any time of a run.
 
 mod builder;
+mod press_numbers;
 mod stage_path;
 
 use std::{
@@ -123,7 +124,7 @@ impl Timeline {
         self.attachments.get(name).map(Vec::as_slice)
     }
 
-    /// The run's events, in order.
+    /// The run's events, in order; their presses are counted as [`Timeline::phase`] counts them.
     pub fn events(&self) -> &[pb::RunEvent] {
         &self.events
     }
@@ -162,7 +163,8 @@ impl Timeline {
         stage_path::position_mm(&self.stage, at)
     }
 
-    /// Phase of the stage, and index of the press, -1 outside one; idle before the run began.
+    /// Phase of the stage, and index of the press, -1 outside one; idle before the run began. In a collection of several runs the presses
+    /// of a later run are counted on after those before.
     pub fn phase(&self, at: MonoTime) -> (Phase, i32) {
         let next = self.phases.partition_point(|(from, _, _)| *from <= at);
         let now = next.checked_sub(1).and_then(|index| self.phases.get(index));

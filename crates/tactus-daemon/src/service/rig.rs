@@ -43,6 +43,8 @@ pub(super) struct Service {
     pub(super) standings: Standings,
     pub(super) runs: Runs,
     pub(super) open: OpenDevices,
+    /// Of all rigs, so that the times of one that starts again go on.
+    pub(super) clock: Clock,
     /// Evaluates scripts.
     pub(super) evaluator: Arc<dyn Evaluate>,
     /// Why the service ends, once it does.
@@ -171,7 +173,7 @@ impl Rig {
             })
         };
         let RigFiles { rig, codec, .. } = RigFiles::clone(files);
-        let clock = Clock::real();
+        let clock = service.clock;
         let Some(rig_service) = rig.service.clone() else {
             return Err(EngineError::NoService { rig: rig.name }.into());
         };
@@ -231,7 +233,7 @@ impl Rig {
     async fn stay_off(&mut self, problem: &str, service: &Service) {
         error!("{problem}");
         service.standings.set(&self.name, Standing::Off(problem.to_owned()));
-        let (clock, publisher) = (Clock::real(), self.bus.publisher());
+        let (clock, publisher) = (service.clock, self.bus.publisher());
         let (name, commands) = (&self.name, &mut self.commands);
         let mut tick = interval(health::PERIOD);
         let mut ending = service.ending.clone();

@@ -118,6 +118,7 @@ impl Lab {
             standings: Standings::default(),
             runs: Runs::default(),
             open: opener(Arc::clone(&defects)),
+            clock: Clock::real(),
             evaluator: Arc::new(InThisProcess),
             ending,
         });

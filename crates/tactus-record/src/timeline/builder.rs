@@ -8,7 +8,7 @@ use tactus_schema::{
     table::Phase,
 };
 
-use super::{StageReport, Timeline};
+use super::{StageReport, Timeline, press_numbers::PressNumbers};
 use crate::{
     Completeness, Entry, EpochClock, Message, NoClock, RecordError, RunMetadata, Tally, header::RIG_JSON,
 };
@@ -26,6 +26,7 @@ pub(super) struct TimelineBuilder {
     coverings: Vec<(MonoTime, f64)>,
     untold: Vec<(MonoTime, MonoTime)>,
     events: Vec<pb::RunEvent>,
+    presses: PressNumbers,
     tally: Tally,
 }
 
@@ -77,7 +78,8 @@ impl TimelineBuilder {
         }
     }
 
-    fn event(&mut self, event: pb::RunEvent) {
+    fn event(&mut self, mut event: pb::RunEvent) {
+        self.presses.renumber(&mut event);
         let at = MonoTime::from_ns(event.t_mono_ns);
         // A collection has events of several runs, and of its own.
         let earlier = self.events.iter().rev().find(|earlier| earlier.run_id == event.run_id);

@@ -5,7 +5,7 @@
 use std::fs;
 
 use crate::synthetic::{Fed, Plan, RIG_TOML, SCRIPT, STARTED_NS};
-use tactus_record::{Completeness, Entry, Message, RecordError, Recording, Tally, info, read};
+use tactus_record::{Completeness, Entry, Message, RecordError, Recording, Tally, info, read, tail};
 use tactus_schema::{Rig, WallTime, pb};
 
 #[test]
@@ -41,6 +41,36 @@ fn every_message_comes_back_in_order() {
             }
         };
         assert_eq!((topic, at, message), (expected_topic, expected_at, &expected));
+    }
+}
+
+#[test]
+fn the_end_of_a_recording_whole_or_cut_off_has_its_last_messages() {
+    let dir = tempfile::tempdir().unwrap();
+    let whole = dir.path().join("run.mcap");
+    Plan::short(4).make().record(&whole).unwrap();
+    let bytes = fs::read(&whole).unwrap();
+    let cut = dir.path().join("cut.mcap");
+    fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    for path in [whole, cut] {
+        let all: Vec<Entry> = read(&path).unwrap().map(Result::unwrap).collect();
+        let is_message = |entry: &&Entry| matches!(entry, Entry::Message { .. });
+        let all_messages = all.iter().filter(is_message).count();
+        for bytes in [8 << 10, 16 << 10, 1 << 30] {
+            let end: Vec<Entry> = tail::entries(&path, bytes).unwrap().map(Result::unwrap).collect();
+            assert_eq!(end[0], all[0], "it says which run it is");
+            let messages: Vec<_> = end.iter().filter(is_message).collect();
+            assert!(messages.iter().rev().zip(all.iter().rev()).all(|(end, all)| *end == all));
+            let is_frame =
+                |entry: &&Entry| matches!(entry, Entry::Message { message: Message::Frame(_), .. });
+            assert!(end.iter().any(|entry| is_frame(&entry)));
+            assert_eq!(
+                messages.len() == all_messages,
+                bytes == 1 << 30,
+                "{} of {all_messages}",
+                messages.len()
+            );
+        }
     }
 }
 

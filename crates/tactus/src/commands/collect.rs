@@ -181,6 +181,7 @@ fn report(common: &Common, args: &CollectArgs, collected: &Collected, problems: 
                     "messages_lost": totals.messages_lost,
                     "messages_asked_again": totals.messages_asked_again,
                     "messages_foreign": totals.messages_foreign,
+                    "restarts": totals.restarts,
                     "problem": problems.get(rig),
                 })
             })

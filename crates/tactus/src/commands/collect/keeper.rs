@@ -24,8 +24,15 @@ pub(super) struct Keeper {
     client: Client,
     place: Place,
     ending: watch::Receiver<bool>,
-    /// Publishers of the topic that has had most of them: one more for each start of the rig.
-    starts: usize,
+    start: Start,
+}
+
+/// What tells that a rig has started again.
+struct Start {
+    /// Publishers of the topic that has had most of them: a service that starts again has others.
+    publishers: usize,
+    /// Number of the last frame: a rig that starts again alone, within its service, counts anew.
+    frame: Option<u64>,
 }
 
 /// Everything that is recorded of a rig.
@@ -37,9 +44,16 @@ struct Topics {
     frames: Subscription<pb::Frame>,
 }
 
+/// When a rig that is heard has started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Begun {
+    Before,
+    Anew,
+}
+
 impl Keeper {
     pub(super) fn new(client: Client, place: Place, ending: watch::Receiver<bool>) -> Self {
-        Self { client, place, ending, starts: 1 }
+        Self { client, place, ending, start: Start { publishers: 1, frame: None } }
     }
 
     /// Records the rig until the collection ends.
@@ -77,7 +91,7 @@ impl Keeper {
     /// Passes everything on until the connection is closed. States first: what was told of a frame before is then known.
     async fn hear(&mut self, topics: &mut Topics) -> Result<(), Ended> {
         loop {
-            tokio::select! {
+            let begun = tokio::select! {
                 biased;
                 () = ended(&mut self.ending) => return Err(Ended),
                 Some(info) = topics.infos.recv() => self.pass(&topics.infos, info, Heard::Info).await?,
@@ -86,6 +100,10 @@ impl Keeper {
                 Some(state) = topics.stages.recv() => self.pass(&topics.stages, state, Heard::Stage).await?,
                 Some(frame) = topics.frames.recv() => self.pass(&topics.frames, frame, Heard::frame).await?,
                 else => return Ok(()),
+            };
+            if begun == Begun::Anew {
+                // A service that was not believed while another one spoke for the rig has told what its sensor is, and nobody heard it.
+                topics.infos = self.client.subscribe(History::All).await.map_err(|_| Ended)?;
             }
         }
     }
@@ -96,12 +114,15 @@ impl Keeper {
         topic: &Subscription<M>,
         message: M,
         heard: fn(M) -> Heard,
-    ) -> Result<(), Ended> {
-        if topic.publishers() > self.starts {
-            self.starts = topic.publishers();
+    ) -> Result<Begun, Ended> {
+        let (gap, message) = (topic.gap(), heard(message));
+        let begun = self.start.begun(topic.publishers(), &message);
+        if begun == Begun::Anew {
             self.place.send(Heard::Restarted).await?;
+            // Its files may be others now, or it is another rig of that name.
+            self.describe().await?;
         }
-        if let Some(gap) = topic.gap() {
+        if let Some(gap) = gap {
             let found = self.ask_again(gap).await;
             let lost = gap.messages().saturating_sub(found.len() as u64);
             self.place.send(Heard::AskedAgain(gap.messages() - lost)).await?;
@@ -113,7 +134,8 @@ impl Keeper {
                 self.place.send(Heard::Lost(M::TOPIC, lost)).await?;
             }
         }
-        self.place.send(heard(message)).await
+        self.place.send(message).await?;
+        Ok(begun)
     }
 
     /// What the publisher still keeps of the missing messages. It may take until the connection is there again.
@@ -140,6 +162,20 @@ impl Keeper {
             () = ended(&mut self.ending) => Err(Ended),
             () = sleep(AGAIN) => Ok(()),
         }
+    }
+}
+
+impl Start {
+    /// Whether the rig has started again before this message.
+    fn begun(&mut self, publishers: usize, message: &Heard) -> Begun {
+        let frame = if let Heard::Frame(frame) = message { Some(frame.seq) } else { None };
+        let goes_back = frame.is_some_and(|frame| self.frame.is_some_and(|last| frame < last));
+        if publishers > self.publishers || goes_back {
+            *self = Self { publishers: publishers.max(self.publishers), frame };
+            return Begun::Anew;
+        }
+        self.frame = frame.or(self.frame);
+        Begun::Before
     }
 }
 

@@ -18,3 +18,21 @@ fn a_rig_is_recorded_if_its_name_is_the_name_of_a_folder() {
         assert!(told(name, not_in_service).is_err(), "{name}");
     }
 }
+
+#[test]
+fn a_rig_has_started_again_if_its_publishers_are_new_or_its_frames_are_counted_anew() {
+    let frame = |seq| Heard::frame(pb::Frame { seq, ..pb::Frame::default() });
+    let mut start = Start { publishers: 1, frame: None };
+    let told = [
+        (1, frame(7)),
+        (1, frame(8)),
+        (2, Heard::Stage(pb::StageState::default())),
+        (2, frame(0)),
+        (1, Heard::Info(pb::SensorInfo::default())),
+        (2, frame(5)),
+        (2, frame(1)),
+        (2, frame(2)),
+    ];
+    let anew = told.map(|(publishers, heard)| start.begun(publishers, &heard) == Begun::Anew);
+    assert_eq!(anew, [false, false, true, false, false, false, true, false]);
+}

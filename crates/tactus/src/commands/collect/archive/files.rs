@@ -1,5 +1,7 @@
 //! The files of one rig: one is open at a time, and each can be read by itself.
 
+mod earlier;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::iter;
@@ -12,6 +14,7 @@ use tactus_schema::pb::{self, run_event::Event};
 use tactus_schema::{Frame, TimeStamp, WallTime};
 
 use super::{Described, Heard, Limits, Totals};
+use earlier::Earlier;
 
 /// Without messages for this time, what waits in memory is written.
 const IDLE: Duration = Duration::from_secs(1);
@@ -32,6 +35,8 @@ pub(super) struct Files {
     described: Option<Described>,
     open: Option<Open>,
     carried: Carried,
+    /// What an earlier collection has of the rig.
+    earlier: Earlier,
     /// Number of the next frame, if none is missing; unknown before the first one.
     due: Option<u64>,
     /// Time of the last message.
@@ -64,6 +69,7 @@ impl Files {
     pub(super) fn new(rig: &str, folder: PathBuf, limits: Limits, who: &str) -> Self {
         Self {
             rig: rig.to_owned(),
+            earlier: Earlier::in_folder(&folder),
             folder,
             limits,
             who: who.to_owned(),
@@ -101,12 +107,12 @@ impl Files {
                 self.carried.info = Some(info);
             }
             Heard::Stage(state) => {
-                self.write(&state)?;
+                self.write_new(&state)?;
                 self.carried.stage = Some(state);
             }
-            Heard::Safety(event) => self.write(&event)?,
+            Heard::Safety(event) => self.write_new(&event)?,
             Heard::Event(event) => {
-                self.write(&*event)?;
+                self.write_new(&*event)?;
                 self.carried.event(*event);
             }
             Heard::Frame(frame) => self.frame(&frame)?,
@@ -114,6 +120,7 @@ impl Files {
                 eprintln!("{}: started again; a new file begins", self.rig);
                 self.close()?;
                 (self.carried, self.due) = (Carried::default(), Some(0));
+                self.earlier = Earlier::default();
                 self.totals.restarts += 1;
             }
             Heard::AskedAgain(messages) => self.totals.messages_asked_again += messages,
@@ -174,6 +181,10 @@ impl Files {
     }
 
     fn frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
+        if self.earlier.has(frame) {
+            self.due = Some(frame.seq.saturating_add(1));
+            return Ok(());
+        }
         if let Some(due) = self.due {
             let at_device = u64::from(frame.lost_before);
             let lost = frame.seq.saturating_sub(due).saturating_sub(at_device);
@@ -205,6 +216,11 @@ impl Files {
         let Some(open) = self.opened()? else { return Ok(()) };
         open.lost += messages;
         open.tell(at, event)
+    }
+
+    /// Writes what an earlier collection does not have.
+    fn write_new<M: Timed>(&mut self, message: &M) -> Result<(), RecordError> {
+        if self.earlier.has(message) { Ok(()) } else { self.write(message) }
     }
 
     fn write<M: Timed>(&mut self, message: &M) -> Result<(), RecordError> {
