@@ -46,7 +46,7 @@ mod reach;
 mod rehearsals;
 
 use tactus_calibrate::FaultyElement;
-use tactus_model::effect::{Definition, ParameterKind};
+use tactus_model::effect::{Definition, EffectError, ParameterKind};
 
 use crate::data::{Bins, DiscoverError, Frames, HeldOut, Known, Noise};
 use crate::fit::{Direction, Free, Parameters, Predictor, Problem, Term};
@@ -178,13 +178,19 @@ impl Planner<'_> {
         }
         for NotShown { effect, .. } in open.not_shown {
             let separates = [(*effect).to_owned(), "nothing".to_owned()];
-            let definition = Definition::find(effect)?;
-            let shows = |one: &Candidate| one.is_own || definition.shown_by.contains(&one.name.as_str());
+            let definition = self.definition(effect)?;
+            let shows = |one: &Candidate| one.is_own || may_show(definition, one);
             let expect = |design: &Design<'_>| self.visibility(design, definition, open.at);
             plan.take(rehearsals.answer(&separates, shows, expect)?, separates, 1);
         }
         plan.left_out = rehearsals.left_out();
         Ok(plan)
+    }
+
+    /// The definition of an effect of the library, or of a draft of the lab.
+    fn definition(self, effect: &str) -> Result<&'static Definition, EffectError> {
+        let draft = self.known.drafts.iter().copied().find(|draft| draft.name == effect);
+        draft.map_or_else(|| Definition::find(effect), Ok)
     }
 
     /// The experiment that gives data a floor.
@@ -275,6 +281,11 @@ impl Planner<'_> {
         bins.weigh(frames, self.noise, &all);
         work(&Problem::new(Predictor::new(self.known, frames, &bins), self.noise))
     }
+}
+
+/// True if an experiment may show an effect. The definition of a draft names none: any may show it.
+fn may_show(definition: &Definition, one: &Candidate) -> bool {
+    definition.shown_by.contains(&one.name.as_str()) || definition.draft().is_some() && one.name != FLOOR
 }
 
 impl Rehearsals<'_> {

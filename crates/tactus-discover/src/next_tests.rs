@@ -1,9 +1,11 @@
-use tactus_model::Registration;
+use tactus_model::effect::{Carrier, Draft, Law, When};
+use tactus_model::{Covariate, Registration};
 use tactus_schema::table::{Phase, RowView};
 
 use super::catalogue::{ELEMENT_DEPTHS_MM, SPEEDS_MM_PER_S, SWEEP_SHARES};
 use super::*;
 use crate::fixtures::{self, ShippedRig};
+use crate::search::not_shown;
 
 /// A sensor that lies where the sample rig has it.
 fn known() -> Known {
@@ -217,6 +219,34 @@ fn an_effect_that_the_data_cannot_show_gets_an_experiment_of_its_own() {
         (&*one.experiment, one.separates.clone()),
         ("diagnose", ["relaxation".into(), "nothing".into()])
     );
+}
+
+/// A draft of the lab by temperature, which these data do not have.
+#[test]
+fn a_draft_that_no_experiment_would_show_is_an_open_question() {
+    let draft = Draft {
+        name: "range-switch".into(),
+        sentence: "The signal changes with temperature".into(),
+        carrier: Carrier::OwnSignal,
+        when: When::InContact,
+        covariates: vec![Covariate::Temperature],
+        ranges: vec![[20.0, 30.0]],
+        law: Law::Linear { offset: 0.0, slope: 0.01 },
+        weights: None,
+    };
+    let draft = draft.define().unwrap();
+    let known = Known { drafts: vec![draft], ..known() };
+    let (frames, noise, rig) = (measured(), noise(), ShippedRig::new(1.0));
+    let not_shown = not_shown::out_of_sight(&[(draft, 0.0)]);
+    let reason = "its change of these data is too small, or recalibration can reproduce it";
+    assert_eq!(not_shown, [NotShown { effect: "range-switch", reason: reason.into() }]);
+    let at = Parameters::declared(&known, 1);
+    let open = Open { pairs: &[], not_shown: &not_shown, at: &at, draft: None, lacks_repeats: false };
+    let plan = planner(&known, &frames, &noise, &rig).plan(open).unwrap();
+    assert_eq!(plan.next, []);
+    let [OpenQuestion { separates, best: Some(best) }] = &plan.open[..] else { panic!("{:?}", plan.open) };
+    assert_eq!(separates, &["range-switch", "nothing"]);
+    assert!(best.expected_z < Some(1e-6), "{best:?}");
 }
 
 #[test]

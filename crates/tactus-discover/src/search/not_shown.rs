@@ -18,6 +18,8 @@ pub struct NotShown {
 /// An effect cannot be shown if its whole range is less than this many standard errors.
 const REACH_LEAST: f64 = 15.0;
 
+const TOO_SMALL: &str = "its change of these data is too small, or recalibration can reproduce it";
+
 /// Effects for which the data lack something. They are no candidates, however well they seem to fit.
 pub(crate) fn lacking(problem: &Problem<'_>, replicates: bool) -> Vec<NotShown> {
     let frames = problem.predictor.frames;
@@ -40,10 +42,10 @@ pub(crate) fn out_of_sight(reach: &[(&'static Definition, f64)]) -> Vec<NotShown
         .filter(|(definition, reach)| *reach < REACH_LEAST && !LATTICE.contains(&definition.name))
         .map(|(definition, _)| NotShown {
             effect: definition.name,
-            reason: format!(
-                "its change of these data is too small, or recalibration can reproduce it; {} would show it",
-                definition.shown_by.join(" or ")
-            ),
+            reason: match definition.shown_by {
+                [] => TOO_SMALL.to_owned(),
+                named => format!("{TOO_SMALL}; {} would show it", named.join(" or ")),
+            },
         });
     unseen.collect()
 }
