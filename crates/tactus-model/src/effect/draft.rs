@@ -398,8 +398,11 @@ impl Draft {
         Ok(())
     }
 
-    /// Checks it against an array.
-    pub(super) fn fits(&self, array: &Array) -> Result<(), EffectError> {
+    /// Checks that it is of an array: that it has a weight for each element, if it has any.
+    ///
+    /// # Errors
+    /// [`EffectError::Draft`] says how many it has.
+    pub fn fits(&self, array: &Array) -> Result<(), EffectError> {
         let elements = array.elements();
         let given = self.weights.as_ref().map_or(elements, Vec::len);
         (given == elements).then_some(()).ok_or_else(|| EffectError::Draft {

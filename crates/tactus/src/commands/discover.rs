@@ -77,7 +77,6 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     let folder = UnfinishedFolder::create(&args.out)?;
     let stages = StageLog::default();
     let library = args.library.in_use()?;
-    let lab = library.iter().map(Held::for_report).collect::<anyhow::Result<_>>()?;
     let analyse = |files: &[PathBuf], live: Option<&LiveRig>, drafts: &[&'static Definition]| {
         analysed(common, args, declared.clone(), files, live, drafts, &stages)
     };
@@ -87,8 +86,14 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
         let drafts = library.iter().map(|one| one.draft.define()).collect::<Result<Vec<_>, _>>()?;
         analyse(&args.files, None, &drafts)?
     };
-    discovered.lab = lab;
-    discovered.discovery.warnings.extend(args.library.is_missing());
+    let mut warnings: Vec<String> = args.library.is_missing().into_iter().collect();
+    for one in &library {
+        match one.of_another_array(&discovered.measured.rig.array) {
+            Some(warning) => warnings.push(warning),
+            None => discovered.lab.push(one.for_report()?),
+        }
+    }
+    discovered.discovery.warnings.extend(warnings);
     let busy = Busy::with("writing", common.json);
     discovered.write(folder.path())?;
     folder.finish()?;
@@ -132,6 +137,7 @@ fn analysed(
             Model::of_rig(&measured.rig).context("the rig's reference indenter is not among its tools")?
         }
     };
+    let drafts = of_this_array(drafts, &measured.rig.array);
     let known = known(&measured.rig, &model, drafts);
     let threads = args.threads.map_or_else(cores, usize::from);
     let rule = match args.ablation {
@@ -276,7 +282,13 @@ fn described(array: &Array) -> String {
     )
 }
 
-fn known(rig: &Rig, model: &Model, drafts: &[&'static Definition]) -> Known {
+/// The drafts that are of the data's array. The lab's library may hold those of its other sensors too.
+fn of_this_array(drafts: &[&'static Definition], array: &Array) -> Vec<&'static Definition> {
+    let is_of = |one: &&&'static Definition| one.draft().is_none_or(|draft| draft.fits(array).is_ok());
+    drafts.iter().filter(is_of).copied().collect()
+}
+
+fn known(rig: &Rig, model: &Model, drafts: Vec<&'static Definition>) -> Known {
     Known {
         array: rig.array.clone(),
         psf: model.base.psf,
@@ -284,7 +296,7 @@ fn known(rig: &Rig, model: &Model, drafts: &[&'static Definition]) -> Known {
         registration: rig.registration,
         indenters: rig.indenters.clone(),
         effects: model.effects.iter().map(|known| known.effect.clone()).collect(),
-        drafts: drafts.to_vec(),
+        drafts,
     }
 }
 

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
+use tactus_model::Array;
 use tactus_report::discovery::LabEffect;
 use tactus_schema::DraftFile;
 
@@ -160,6 +161,12 @@ impl Held {
         Ok(LabEffect { name, status: self.draft.status, sha256: sha256::of_file(&self.path)? })
     }
 
+    /// A warning if the draft is of another array than the data.
+    pub(crate) fn of_another_array(&self, array: &Array) -> Option<String> {
+        let error = self.draft.draft.fits(array).err()?;
+        Some(format!("{}: {error}; it is of another array, and was not tried", self.path.display()))
+    }
+
     /// Writes the draft, first beside its place, so that the file is never half of one.
     ///
     /// # Errors
@@ -171,3 +178,7 @@ impl Held {
         fs::rename(&beside, &self.path).with_context(|| format!("{} cannot be written", self.path.display()))
     }
 }
+
+#[cfg(test)]
+#[path = "library_tests.rs"]
+mod tests;

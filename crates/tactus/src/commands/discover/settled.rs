@@ -81,7 +81,7 @@ pub(in crate::commands) fn confirm(
         None => Model::of_rig(&new.rig).context("the rig's reference indenter is not among its tools")?,
     };
     let name = file.draft.name.clone();
-    let told = measured_anew(file.clone(), &known(&new.rig, &model, &[]), &new, seed)?;
+    let told = measured_anew(file.clone(), &known(&new.rig, &model, Vec::new()), &new, seed)?;
     let too_short = |why| usage(format!("the recordings are too short to tell whether {name} holds: {why}"));
     Ok(told.map_err(too_short)?)
 }
