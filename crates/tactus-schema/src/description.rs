@@ -9,7 +9,7 @@ mod one_or_each;
 
 pub(crate) use array::RawArray;
 pub(crate) use indenter::RawIndenter;
-pub(crate) use number::{finite, not_negative, positive, range};
+pub(crate) use number::{LARGEST, finite, not_negative, positive, range};
 pub(crate) use one_or_each::OneOrEach;
 
 /// A wrong field; becomes the variant `Field` of each file's error.

@@ -35,11 +35,13 @@ use serde::{Deserialize, Serialize};
 use tactus_model::Covariate;
 use tactus_model::effect::{Carrier, Definition, Draft, EffectError, Law, PipelineStage, When};
 
-use crate::description::{WrongField, check_kind, check_schema, wrong};
+use crate::description::{LARGEST, WrongField, check_kind, check_schema, wrong};
 use line::line_of;
 
 /// The schema's name in the file.
 pub const SCHEMA: &str = "tactus.draft/1";
+/// The folds of a discovery, in each of which a draft may come first.
+const FOLDS: u32 = 5;
 
 /// A draft with what speaks for it.
 #[derive(Debug, Clone, PartialEq)]
@@ -248,7 +250,9 @@ impl DraftFile {
             confirmation: raw.confirmation,
         };
         file.check_numbers()?;
+        file.check_nearest()?;
         file.check_evidence()?;
+        file.check_confirmation()?;
         Ok(file)
     }
 
@@ -264,55 +268,75 @@ impl DraftFile {
             let of = if least == most { most.to_string() } else { format!("{least} or {most}") };
             return Err(wrong("covariance", format!("must have {of} rows for this law, not {size}")));
         }
-        match self.covariance.iter().position(|row| row.len() != size) {
-            Some(row) => {
-                let given = self.covariance[row].len();
-                Err(wrong(format!("covariance[{row}]"), format!("must have {size} numbers, not {given}")))
+        for (index, row) in self.covariance.iter().enumerate() {
+            let field = || format!("covariance[{index}]");
+            if row.len() != size {
+                return Err(wrong(field(), format!("must have {size} numbers, not {}", row.len())));
             }
-            None => Ok(()),
+            row.iter().try_for_each(|number| finite(field(), *number))?;
         }
+        Ok(())
+    }
+
+    /// Checks the classes that come nearest.
+    fn check_nearest(&self) -> Result<(), WrongField> {
+        for (index, one) in self.nearest.iter().enumerate() {
+            plain(format!("nearest[{index}].class"), &one.class)?;
+            finite(format!("nearest[{index}].ln_odds_behind"), one.ln_odds_behind)?;
+        }
+        Ok(())
+    }
+
+    /// What the file must bear out: what a withdrawn draft would be if somebody took it back.
+    fn stated(&self) -> DraftStatus {
+        let mut back = self.clone();
+        back.take_back();
+        back.status
     }
 
     /// Checks that what speaks for the draft is there.
     fn check_evidence(&self) -> Result<(), WrongField> {
+        if self.was == Some(DraftStatus::Retired) {
+            return Err(wrong("was", "must be what the draft was before a person withdrew it, not \"retired\""));
+        }
         let is_stated =
-            self.covariance.is_empty() && self.nearest.is_empty() && self.status != DraftStatus::Partial;
-        match &self.evidence {
-            None if is_stated => {}
-            None => {
-                return Err(wrong(
-                    "evidence",
-                    "is missing: the file has lost its end, or it was cut by hand",
-                ));
-            }
-            Some(seen) if seen.data.is_empty() => {
-                return Err(wrong("evidence.data", "must name the data; the file may have lost its end"));
-            }
-            Some(seen) if !(0.0..=1.0).contains(&seen.p_value) => {
-                return Err(wrong(
-                    "evidence.p_value",
-                    format!("must be between 0 and 1, not {}", seen.p_value),
-                ));
-            }
-            Some(_) => {}
+            self.covariance.is_empty() && self.nearest.is_empty() && self.stated() != DraftStatus::Partial;
+        let Some(seen) = &self.evidence else {
+            let is_lost = "is missing: the file has lost its end, or it was cut by hand";
+            return if is_stated { Ok(()) } else { Err(wrong("evidence", is_lost)) };
+        };
+        if seen.data.is_empty() {
+            return Err(wrong("evidence.data", "must name the data; the file may have lost its end"));
         }
-        let is_measured = matches!(self.status, DraftStatus::Confirmed | DraftStatus::Refuted);
-        match &self.confirmation {
-            None if is_measured => Err(wrong(
-                "confirmation",
-                format!(
-                    "is missing: a draft is {} by a new measurement, and the file has none",
-                    self.status.name()
-                ),
-            )),
-            Some(told) if told.data.is_empty() => {
-                Err(wrong("confirmation.data", "must name the new data; the file may have lost its end"))
-            }
-            Some(told) if !told.strength.is_finite() => {
-                Err(wrong("confirmation.strength", format!("must be finite, not {}", told.strength)))
-            }
-            None | Some(_) => Ok(()),
+        seen.data.keys().try_for_each(|run| plain("evidence.data", run))?;
+        if !(0.0..=1.0).contains(&seen.p_value) {
+            return Err(wrong("evidence.p_value", format!("must be between 0 and 1, not {}", seen.p_value)));
         }
+        finite("evidence.ln_odds", seen.ln_odds)?;
+        if seen.folds > FOLDS {
+            return Err(wrong("evidence.folds", format!("must be at most {FOLDS}, not {}", seen.folds)));
+        }
+        check_share("evidence", seen.closed_share, seen.closed_share_se)
+    }
+
+    /// Checks what a new measurement says, and that it is there if the status rests on one.
+    fn check_confirmation(&self) -> Result<(), WrongField> {
+        let status = self.stated();
+        let is_measured = matches!(status, DraftStatus::Confirmed | DraftStatus::Refuted);
+        let Some(told) = &self.confirmation else {
+            let name = status.name();
+            let is_missing =
+                format!("is missing: a draft is {name} by a new measurement, and the file has none");
+            return if is_measured { Err(wrong("confirmation", is_missing)) } else { Ok(()) };
+        };
+        if told.data.is_empty() {
+            let is_empty = "must name the new data; the file may have lost its end";
+            return Err(wrong("confirmation.data", is_empty));
+        }
+        told.data.keys().try_for_each(|run| plain("confirmation.data", run))?;
+        finite("confirmation.strength", told.strength)?;
+        error("confirmation.strength_se", told.strength_se)?;
+        check_share("confirmation", told.closed_share, told.closed_share_se)
     }
 
     /// The text of the draft file; reading it gives the same draft, to the bit.
@@ -472,7 +496,64 @@ impl RawDraft {
         };
         agree(field, "stage", &self.stage, stage_name(draft.stage()))?;
         agree(field, "combine", &self.combine, combine(carrier))?;
+        plain(format!("{field}.sentence"), &draft.sentence)?;
+        // What is no effect at all is told by its own check.
+        if draft.check().is_ok() {
+            check_curve(&draft, field)?;
+        }
         Ok(draft)
+    }
+}
+
+/// Checks that a draft changes a model by finite numbers: that its curve, and each weight's part of it, is within [`LARGEST`] on its range.
+fn check_curve(draft: &Draft, field: &str) -> Result<(), WrongField> {
+    let within = |key: &str, value: f64| {
+        let problem = format!("must not give an effect beyond +-{LARGEST:e}; it gives {value:e}");
+        if value.abs() <= LARGEST { Ok(()) } else { Err(wrong(format!("{field}.{key}"), problem)) }
+    };
+    let (key, values) = match &draft.law {
+        Law::Table { values, .. } => ("values", values.clone()),
+        // It goes on beyond its range.
+        Law::Periodic { offset, sine, cosine, per_unit } => {
+            within("numbers.per_unit", *per_unit)?;
+            ("numbers", vec![offset.abs() + sine.hypot(*cosine)])
+        }
+        // Each of these is greatest at an end.
+        law => ("numbers", draft.ranges[0].iter().map(|end| law.value(&[*end])).collect()),
+    };
+    values.iter().try_for_each(|value| within(key, *value))?;
+    let most = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    draft.weights.iter().flatten().try_for_each(|weight| within("weights", weight * most))
+}
+
+/// Checks a share of what was left that a draft closes, and its standard error. A draft that makes it worse closes less than nothing.
+fn check_share(field: &str, share: Option<f64>, se: Option<f64>) -> Result<(), WrongField> {
+    if let Some(share) = share.filter(|share| !(share.is_finite() && *share <= 1.0)) {
+        return Err(wrong(format!("{field}.closed_share"), format!("must be finite and at most 1, not {share}")));
+    }
+    error(&format!("{field}.closed_share_se"), se)
+}
+
+/// Checks a number that may be as large as it likes.
+fn finite(field: impl Into<String>, value: f64) -> Result<(), WrongField> {
+    if value.is_finite() { Ok(()) } else { Err(wrong(field, format!("must be finite, not {value}"))) }
+}
+
+/// Checks a standard error, if there is one.
+fn error(field: &str, se: Option<f64>) -> Result<(), WrongField> {
+    match se {
+        Some(se) if !(se.is_finite() && se >= 0.0) => {
+            Err(wrong(field, format!("must be finite and not negative, not {se}")))
+        }
+        Some(_) | None => Ok(()),
+    }
+}
+
+/// Checks that a text has no control characters: it is shown on terminals.
+fn plain(field: impl Into<String>, text: &str) -> Result<(), WrongField> {
+    match text.chars().find(|letter| letter.is_control()) {
+        Some(letter) => Err(wrong(field, format!("must have no control characters, such as {letter:?}"))),
+        None => Ok(()),
     }
 }
 

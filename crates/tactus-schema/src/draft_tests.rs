@@ -82,14 +82,19 @@ fn there_and_back_is_the_same_to_the_bit() {
     assert_eq!(back.to_toml().unwrap(), text);
 }
 
+/// A model with a draft of this file at half its strength.
+fn in_a_model(draft: &str) -> String {
+    let digitacts = include_str!("../../../config/models/digitacts.toml");
+    let indented = draft[draft.find("name = \"draft-1\"").unwrap()..]
+        .replace("[[effect.covariate]]", "[[effect.draft.covariate]]");
+    format!(
+        "{digitacts}\n[[effect]]\nname = \"draft-1\"\nparameters = {{ strength = 0.5 }}\n[effect.draft]\n{indented}"
+    )
+}
+
 #[test]
 fn a_model_file_holds_its_drafts_whole() {
-    let digitacts = include_str!("../../../config/models/digitacts.toml");
-    let indented = STATED[STATED.find("name = \"draft-1\"").unwrap()..]
-        .replace("[[effect.covariate]]", "[[effect.draft.covariate]]");
-    let text = format!(
-        "{digitacts}\n[[effect]]\nname = \"draft-1\"\nparameters = {{ strength = 0.5 }}\n[effect.draft]\n{indented}"
-    );
+    let text = in_a_model(STATED);
     let model = Model::from_toml(&text).unwrap();
     let effect = &model.effects[0].effect;
     assert_eq!((effect.name(), effect.value("strength")), ("draft-1", Some(0.5)));
@@ -196,6 +201,15 @@ fn damaged_numbers_are_refused_with_their_place() {
         ("p_value = 0.0005", "p_value = 5.0", "evidence.p_value: must be between 0 and 1"),
         ("strength = 0.3333333333333333", "strength = nan", "confirmation.strength: must be finite"),
         ("seed = 7", "seed = 7\nsead = 7", "unknown field `sead`"),
+        ("[0.0001, 0.0]", "[nan, 0.0]", "line 3: covariance[0]: must be finite, not NaN"),
+        ("ln_odds_behind = 31.4", "ln_odds_behind = inf", "nearest[0].ln_odds_behind: must be finite"),
+        ("ln_odds = 103.25", "ln_odds = nan", "evidence.ln_odds: must be finite"),
+        ("folds = 5", "folds = 6", "evidence.folds: must be at most 5, not 6"),
+        ("closed_share = 0.93", "closed_share = nan", "evidence.closed_share: must be finite and at most 1"),
+        ("closed_share = 0.93", "closed_share = 1.2", "evidence.closed_share: must be finite and at most 1"),
+        ("closed_share_se = 0.04", "closed_share_se = -0.04", "evidence.closed_share_se: must be finite and not"),
+        ("strength_se = 0.02", "strength_se = inf", "confirmation.strength_se: must be finite and not negative"),
+        ("strength = 0.3", "closed_share = -inf\nstrength = 0.3", "confirmation.closed_share: must be finite"),
     ] {
         let text = confirmed().replacen(from, to, 1);
         assert_ne!(text, confirmed(), "{from}: {text}");
@@ -217,4 +231,70 @@ fn a_withdrawn_draft_comes_back_as_what_it_was() {
     let mut older = DraftFile::from_toml(&older).unwrap();
     older.take_back();
     assert_eq!(older.status, DraftStatus::Drafted, "the file does not say what it was");
+}
+
+#[test]
+fn a_curve_that_gives_no_finite_number_is_refused_in_draft_and_model_files() {
+    let law = |name: &str, numbers: &str| {
+        let given = format!("law = \"{name}\"\nnumbers = {numbers}");
+        STATED.replacen("law = \"linear\"\nnumbers = { offset = 3.0, slope = 0.0 }", &given, 1)
+    };
+    let table = "law = \"table\"\nat = [[0.0, 0.6]]\nvalues = [-1e308, 1e308]";
+    for (text, want) in [
+        (law("power", "{ scale = 1.0, exponent = -3.0 }"), "effect.numbers: must not give an effect beyond"),
+        (law("power", "{ scale = 1.0, exponent = -1e300 }"), "effect.numbers: must not give an effect beyond"),
+        (law("exponential", "{ scale = 1e13, length = 1.0 }"), "it gives 1e13"),
+        (law("logarithm", "{ scale = 1.0, length = 1e-320 }"), "effect.numbers: must not give an effect beyond"),
+        (
+            law("periodic", "{ offset = 0.0, sine = 1.0, cosine = 1.0, per_unit = 1e308 }"),
+            "effect.numbers.per_unit: must not give",
+        ),
+        (law("linear", "{ offset = 3.0, slope = 0.0 }\nweights = [1.0, 1e12]"), "effect.weights: must not give"),
+        (
+            STATED.replacen("law = \"linear\"\nnumbers = { offset = 3.0, slope = 0.0 }", table, 1),
+            "effect.values: must not give",
+        ),
+    ] {
+        let told = DraftFile::from_toml(&text).unwrap_err().to_string();
+        assert!(told.contains(want), "{want}: {told}");
+    }
+    let power = law("power", "{ scale = 1.0, exponent = -3.0 }");
+    assert!(DraftFile::from_toml(&power.replace("[0.0, 0.6]", "[0.1, 0.6]")).is_ok(), "it never gets to 0");
+    let told = Model::from_toml(&in_a_model(&power)).unwrap_err().to_string();
+    assert!(told.contains("effect[0].draft.numbers: must not give an effect beyond"), "{told}");
+}
+
+#[test]
+fn control_characters_are_refused_since_texts_are_shown_on_terminals() {
+    let text = STATED.replacen("rise.", "rise.\\u001b[2J", 1);
+    let told = DraftFile::from_toml(&text).unwrap_err().to_string();
+    assert!(told.starts_with("line 7: effect.sentence: must have no control characters"), "{told}");
+    for (from, want) in [
+        ("saturation", "nearest[0].class: must have no control"),
+        ("run-1", "evidence.data: must have no control"),
+        ("run-2", "confirmation.data: must have no control"),
+    ] {
+        let with = format!("\"{from}\\u0007\"");
+        let text = confirmed().replacen(&format!("\"{from}\""), &with, 1);
+        let text = text.replacen(&format!("{from} ="), &format!("{with} ="), 1);
+        let told = DraftFile::from_toml(&text).unwrap_err().to_string();
+        assert!(told.contains(want), "{want}: {told}");
+    }
+}
+
+#[test]
+fn a_withdrawn_draft_must_have_what_taking_it_back_needs() {
+    let mut file = DraftFile::from_toml(&confirmed()).unwrap();
+    file.retire();
+    let text = file.to_toml().unwrap();
+    let cut = &text[..text.find("[confirmation]").unwrap()];
+    let told = DraftFile::from_toml(cut).unwrap_err().to_string();
+    assert!(told.contains("confirmation: is missing: a draft is confirmed by a new measurement"), "{told}");
+    let cut = cut.replacen("was = \"confirmed\"", "was = \"drafted\"", 1);
+    assert!(DraftFile::from_toml(&cut).is_ok(), "it was never measured anew");
+    let told = DraftFile::from_toml(&text.replacen("\"confirmed\"", "\"retired\"", 1)).unwrap_err().to_string();
+    assert!(told.contains("was: must be what the draft was before"), "{told}");
+    let stated = STATED.replacen("\"drafted\"", "\"retired\"\nwas = \"partial\"", 1);
+    let told = DraftFile::from_toml(&stated).unwrap_err().to_string();
+    assert!(told.contains("evidence: is missing"), "{told}");
 }

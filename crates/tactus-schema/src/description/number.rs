@@ -3,7 +3,7 @@
 use super::{WrongField, wrong};
 
 /// Larger than any quantity in a lab in the units used here; sums and products of a few such numbers stay finite.
-const LARGEST: f64 = 1e12;
+pub(crate) const LARGEST: f64 = 1e12;
 
 pub(crate) fn finite(field: impl Into<String>, value: f64) -> Result<f64, WrongField> {
     if value.abs() <= LARGEST {

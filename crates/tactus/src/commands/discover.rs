@@ -213,7 +213,11 @@ impl Discovered {
             draft: found.draft.clone(),
             status: draft_status(found),
             was: None,
-            covariance: found.covariance.clone(),
+            // That of a law is no number where the data do not determine it.
+            covariance: Some(&found.covariance)
+                .filter(|rows| rows.iter().flatten().all(|number| number.is_finite()))
+                .cloned()
+                .unwrap_or_default(),
             nearest: nearest
                 .map(|(class, behind)| Nearest { class: (*class).to_owned(), ln_odds_behind: *behind })
                 .collect(),
