@@ -39,6 +39,9 @@ pub(in crate::commands) use settled::confirm;
 /// What a discovery writes: the report, its numbers, the grown model and the residuals.
 const FILES: [&str; 4] = ["report.html", "report.json", "model.toml", "residuals.parquet"];
 
+/// What follows the name of a draft in that of its file, if it was refuted.
+const REFUTED: &str = "-refuted";
+
 /// A discovery with its data and its model.
 struct Discovered {
     measured: Measurements,
@@ -96,7 +99,8 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     discovered.discovery.warnings.extend(warnings);
     let busy = Busy::with("writing", common.json);
     discovered.write(folder.path())?;
-    folder.finish()?;
+    let is_library = args.library.folder().is_some_and(|library| is_same_folder(&library, &args.out));
+    folder.finish(|name| is_name_of_draft(name) && !is_library)?;
     discovered.remeasured.iter().try_for_each(Held::write)?;
     drop(busy);
     args.stages.as_deref().map(|path| stages.finish(path)).transpose()?;
@@ -198,7 +202,7 @@ impl Discovered {
     /// The files of all drafts, with their names.
     fn drafts(&self) -> anyhow::Result<Vec<(String, DraftFile)>> {
         let named = |file: &DraftFile| {
-            let refuted = if file.status == DraftStatus::Refuted { "-refuted" } else { "" };
+            let refuted = if file.status == DraftStatus::Refuted { REFUTED } else { "" };
             (format!("{}{refuted}.toml", file.draft.name), file.clone())
         };
         Ok(self.settled.iter().chain(&self.draft()?).map(named).collect())
@@ -248,6 +252,19 @@ impl Discovered {
             discovery: &self.discovery,
         }
     }
+}
+
+/// True of the name of a draft's file as a discovery gives it: `draft-1.toml`, or `draft-1-refuted.toml`.
+fn is_name_of_draft(name: &str) -> bool {
+    let number = name.strip_prefix("draft-").and_then(|rest| rest.strip_suffix(".toml"));
+    let number = number.map(|rest| rest.strip_suffix(REFUTED).unwrap_or(rest));
+    number.is_some_and(|number| !number.is_empty() && number.chars().all(|digit| digit.is_ascii_digit()))
+}
+
+/// True if both are there and are one folder.
+fn is_same_folder(one: &Path, other: &Path) -> bool {
+    let [one, other] = [one, other].map(|path| path.canonicalize().ok());
+    one.is_some() && one == other
 }
 
 /// Reads a model file.

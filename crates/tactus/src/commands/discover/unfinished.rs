@@ -28,17 +28,27 @@ impl UnfinishedFolder {
         self.beside.path()
     }
 
-    /// Moves the files to where they belong; replaces those of an earlier discovery.
-    pub(super) fn finish(self) -> anyhow::Result<()> {
+    /// Moves the files to where they belong; replaces those of an earlier discovery. Of its files that this one lacks, `is_stale` tells by
+    /// their names which are removed.
+    pub(super) fn finish(self, is_stale: impl Fn(&str) -> bool) -> anyhow::Result<()> {
         let Self { out, beside } = &self;
         beside
             .finish(|beside| {
                 if !out.exists() {
                     return fs::rename(beside, out);
                 }
+                let mut new = Vec::new();
                 for file in fs::read_dir(beside)? {
                     let file = file?;
                     fs::rename(file.path(), out.join(file.file_name()))?;
+                    new.push(file.file_name());
+                }
+                for file in fs::read_dir(out)? {
+                    let file = file?;
+                    let name = file.file_name();
+                    if !new.contains(&name) && name.to_str().is_some_and(&is_stale) {
+                        fs::remove_file(file.path())?;
+                    }
                 }
                 fs::remove_dir(beside)
             })
@@ -54,3 +64,7 @@ fn with_extension(path: &Path, extension: &str) -> PathBuf {
     longer.push(extension);
     longer.into()
 }
+
+#[cfg(test)]
+#[path = "unfinished_tests.rs"]
+mod tests;
