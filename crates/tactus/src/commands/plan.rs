@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use serde_json::json;
 use tactus_plan::{Arguments, Parameter, RigView, Script};
 use tactus_runner::config;
@@ -36,14 +36,7 @@ fn plan_of(common: &Common, args: &PlanArgs, script: Script, arguments: Argument
         script.parameters(&RigView::of(&rig)).map_err(|error| Failure::new(Exit::Usage, error))?;
     let summary = script.doc().lines().next().unwrap_or_default().to_owned();
     let (name, source) = (script.name().to_owned(), script.source().to_owned());
-    let request = RunRequest {
-        script,
-        arguments,
-        seed: Some(args.experiment.seed.unwrap_or(SEED)),
-        who: "plan".into(),
-        evaluator: Arc::new(ScriptProcesses::of_this_program()),
-        earlier: None,
-    };
+    let request = request(script, arguments, args.experiment.seed.unwrap_or(SEED));
     let never = || false;
     let order = order::order(request, &rig, WallTime::default(), &never)
         .map_err(|error| Failure::new(Exit::Usage, error))?;
@@ -70,6 +63,31 @@ fn plan_of(common: &Common, args: &PlanArgs, script: Script, arguments: Argument
     Ok(Exit::of_run(plan.outcome.exit_status))
 }
 
+/// How long an experiment takes on a rig, by a dry run on its twin.
+///
+/// # Errors
+/// If there is no such experiment with these parameters, or the twin refuses it.
+pub(super) fn duration_s(rig: &Rig, name: &str, parameters: &[String], seed: u64) -> anyhow::Result<f64> {
+    let (script, arguments) = experiment(name, parameters)?;
+    let request = request(script, arguments, seed);
+    let never = || false;
+    let order = order::order(request, rig, WallTime::default(), &never)?;
+    let plan = twin::dry_run(rig, order, &never)?;
+    ensure!(plan.is_possible(), "{}", plan.outcome.message);
+    Ok(plan.outcome.duration_s)
+}
+
+fn request(script: Script, arguments: Arguments, seed: u64) -> RunRequest {
+    RunRequest {
+        script,
+        arguments,
+        seed: Some(seed),
+        who: "plan".into(),
+        evaluator: Arc::new(ScriptProcesses::of_this_program()),
+        earlier: None,
+    }
+}
+
 /// The command that runs what was planned.
 fn run_command(args: &PlanArgs) -> String {
     let PlanArgs { experiment, embedded, rig_file } = args;
@@ -86,8 +104,8 @@ fn run_command(args: &PlanArgs) -> String {
 }
 
 /// The rig that would run the experiment.
-struct PlannedRig {
-    rig: Rig,
+pub(super) struct PlannedRig {
+    pub(super) rig: Rig,
     /// Whose rig it is, for a person.
     whose: String,
 }
@@ -106,14 +124,20 @@ impl PlannedRig {
         if args.embedded {
             return embedded("as asked");
         }
+        match Self::served(common)? {
+            Some(served) => Ok(served),
+            None => embedded(&format!("no service at {}", common.endpoint)),
+        }
+    }
+
+    /// The service's rig; `None` without a service.
+    pub(super) fn served(common: &Common) -> anyhow::Result<Option<Self>> {
         connection::runtime()?.block_on(async {
-            let Some(client) = connection::find(common).await? else {
-                return embedded(&format!("no service at {}", common.endpoint));
-            };
+            let Some(client) = connection::find(common).await? else { return Ok(None) };
             let request = pb::CommandRequest { who: connection::who(), ..Default::default() };
             let told = connection::ask(&client, Command::Status, &request, PATIENCE).await?;
             client.close().await?;
-            Self::of_service(&told, &common.endpoint)
+            Self::of_service(&told, &common.endpoint).map(Some)
         })
     }
 

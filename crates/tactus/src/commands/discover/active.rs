@@ -16,9 +16,9 @@ use super::settled::{self, Settled};
 use super::{Discovered, LiveRig};
 use crate::cli::{Common, DiscoverArgs, ExperimentArgs, LeaseArgs, RunArgs, RunSubject};
 use crate::commands::library::Held;
+use crate::commands::plan::{self, PlannedRig};
 use crate::commands::run::{RunSummary, execute_part};
-use crate::connection;
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, in_words};
 use crate::output::{duration, say};
 
 /// Runs experiments on the service or on the embedded rig.
@@ -26,6 +26,8 @@ struct ExperimentRunner<'a> {
     common: &'a Common,
     args: &'a DiscoverArgs,
     live: LiveRig,
+    /// The rig on whose twin experiments are planned: of a service, as it stands there.
+    planned_on: Rig,
     /// Remaining rig time.
     budget_s: f64,
     /// Number of experiments so far.
@@ -54,9 +56,7 @@ pub(super) fn discover(
     let mut runner = ExperimentRunner::find(common, args)?;
     let mut files = args.files.clone();
     if files.is_empty() {
-        files.push(
-            runner.run(&ChosenExperiment::diagnose((runner.budget_s / 2.0 / DIAGNOSE_S).min(1.0)))?.recording,
-        );
+        files.push(runner.run(&runner.first()?)?.recording);
     }
     let mut drafts = Drafts::of(library)?;
     let mut discovered = analyse(&files, Some(&runner.live), &drafts.in_use)?;
@@ -64,7 +64,8 @@ pub(super) fn discover(
     let mut active_ended = None;
     for nth in 1..=args.rounds {
         let unconfirmed = drafts.unconfirmed(&discovered.discovery);
-        let chosen = match choose(&discovered.discovery, &unconfirmed, runner.budget_s, &active) {
+        let planned_s = |one: &ChosenExperiment| runner.planned_s(one);
+        let chosen = match choose(&discovered.discovery, &unconfirmed, runner.budget_s, &active, &planned_s) {
             Ok(chosen) => chosen,
             Err(why) => {
                 let why = format!("Round {nth} of {} runs nothing: {why}.", args.rounds);
@@ -77,6 +78,11 @@ pub(super) fn discover(
         let before = undecided(&discovered.discovery);
         let mut round = Vec::new();
         for chosen in chosen {
+            // One before it may have taken longer than it should.
+            if chosen.duration_s > runner.budget_s {
+                runner.say(&chosen.is_too_long(runner.budget_s));
+                continue;
+            }
             let summary = runner.run(&chosen)?;
             round.push(ActiveRun {
                 experiment: chosen.experiment,
@@ -159,6 +165,9 @@ impl<'a> Drafts<'a> {
     }
 }
 
+/// How long an experiment would take on the rig, in seconds, or why nobody can tell.
+type PlannedSeconds<'a> = &'a dyn Fn(&ChosenExperiment) -> Result<f64, String>;
+
 /// The best affordable experiment for each undecided pair; `diagnose` if there is none and a draft of the library is unconfirmed or something is
 /// unexplained.
 ///
@@ -169,6 +178,7 @@ fn choose(
     unconfirmed: &[&Held],
     budget_s: f64,
     done: &[ActiveRun],
+    planned_s: PlannedSeconds<'_>,
 ) -> Result<Vec<ChosenExperiment>, String> {
     let mut chosen: Vec<ChosenExperiment> = Vec::new();
     let undecided = found.plan.open.iter().filter(|one| one.separates[1] != "nothing");
@@ -185,12 +195,7 @@ fn choose(
         } else if one.is_done(done) {
             reasons.push(format!("`{}` was run already", one.command()));
         } else if one.duration_s > left_s {
-            reasons.push(format!(
-                "`{}` takes {}, and {} of the budget are left",
-                one.command(),
-                duration(one.duration_s),
-                duration(left_s)
-            ));
+            reasons.push(one.is_too_long(left_s));
         } else {
             answered.push(&next.separates);
             left_s -= one.duration_s;
@@ -203,15 +208,11 @@ fn choose(
     if reasons.is_empty() {
         reasons.push(nothing_open(found).to_owned());
     }
-    if let Some(one) = diagnosis(found, unconfirmed, budget_s, done) {
-        let command = command(&one.experiment, &[]);
-        if one.duration_s < DIAGNOSE_SCALE_LEAST * DIAGNOSE_S {
-            reasons.push(format!("the budget of {} is too short for `{command}`", duration(budget_s)));
-        } else if one.is_done(done) {
-            reasons.push(format!("`{}` was run already", one.command()));
-        } else {
-            return Ok(vec![one]);
-        }
+    match diagnosis(found, unconfirmed, budget_s, done, planned_s) {
+        Some(Ok(one)) if one.is_done(done) => reasons.push(format!("`{}` was run already", one.command())),
+        Some(Ok(one)) => return Ok(vec![one]),
+        Some(Err(why)) => reasons.push(why),
+        None => {}
     }
     Err(reasons.join("; "))
 }
@@ -222,21 +223,56 @@ fn diagnosis(
     unconfirmed: &[&Held],
     budget_s: f64,
     done: &[ActiveRun],
-) -> Option<ChosenExperiment> {
-    let affordable = |most: f64| (100.0 * (budget_s / DIAGNOSE_S).min(most)).floor() / 100.0;
+    planned_s: PlannedSeconds<'_>,
+) -> Option<Result<ChosenExperiment, String>> {
     if let Some(draft) = unconfirmed.first() {
         // The data that are there may be of the seed of the discovery.
         let seed = found.seed.wrapping_add(ANEW_SEED).wrapping_add(done.len() as u64);
-        let separates = [draft.draft.draft.name.clone(), NOISE.into()];
-        return Some(ChosenExperiment {
-            separates,
+        let of = |percent| ChosenExperiment {
+            separates: [draft.draft.draft.name.clone(), NOISE.into()],
             seed: Some(seed),
-            ..ChosenExperiment::diagnose(affordable(ANEW_SCALE))
-        });
+            ..ChosenExperiment::diagnose(percent)
+        };
+        return Some(longest(of, ANEW_PERCENT, budget_s, planned_s));
     }
     let is_open =
         matches!(found.verdict, Verdict::CannotJudge | Verdict::Unexplained | Verdict::PartlyExplained);
-    is_open.then(|| ChosenExperiment::diagnose(affordable(1.0)))
+    is_open.then(|| longest(ChosenExperiment::diagnose, 100, budget_s, planned_s))
+}
+
+/// The longest `diagnose` that the time allows, of so many percent at most: its parts have least lengths, so only a plan tells how long one is.
+///
+/// # Errors
+/// How long the shortest one takes that is worth its time, if that is too long, or why there is no plan.
+fn longest(
+    of: impl Fn(u32) -> ChosenExperiment,
+    most_percent: u32,
+    budget_s: f64,
+    planned_s: PlannedSeconds<'_>,
+) -> Result<ChosenExperiment, String> {
+    let planned = |percent: u32| {
+        let one = of(percent);
+        Ok::<_, String>(ChosenExperiment { duration_s: planned_s(&one)?, ..one })
+    };
+    let full = planned(most_percent)?;
+    if full.duration_s <= budget_s {
+        return Ok(full);
+    }
+    let mut fits = planned(LEAST_PERCENT)?;
+    if fits.duration_s > budget_s {
+        return Err(fits.is_too_long(budget_s));
+    }
+    let (mut least, mut too_long) = (LEAST_PERCENT, most_percent);
+    while too_long - least > 1 {
+        let percent = u32::midpoint(least, too_long);
+        let one = planned(percent)?;
+        if one.duration_s <= budget_s {
+            (least, fits) = (percent, one);
+        } else {
+            too_long = percent;
+        }
+    }
+    Ok(fits)
 }
 
 /// A sentence as part of another one.
@@ -245,11 +281,11 @@ fn lowered(sentence: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }
 
-/// Least `scale` of a `diagnose` that is worth its time.
-const DIAGNOSE_SCALE_LEAST: f64 = 0.1;
+/// Least `scale` of a `diagnose` that is worth its time, in percent.
+const LEAST_PERCENT: u32 = 10;
 
-/// The `scale` of a `diagnose` that measures a draft of the library anew.
-const ANEW_SCALE: f64 = 0.3;
+/// The `scale` of a `diagnose` that measures a draft of the library anew, in percent.
+const ANEW_PERCENT: u32 = 30;
 
 /// Makes another seed of that of a discovery.
 const ANEW_SEED: u64 = 0x5eed;
@@ -259,9 +295,6 @@ const NOISE: &str = "noise";
 
 /// What a `diagnose` looks for if nothing is named.
 const MISSING: &str = "what is missing";
-
-/// Approximate duration of `diagnose` at scale 1.
-const DIAGNOSE_S: f64 = 1100.0;
 
 impl ChosenExperiment {
     /// An experiment of a plan; one that was run before has another seed.
@@ -279,13 +312,15 @@ impl ChosenExperiment {
         }
     }
 
-    fn diagnose(scale: f64) -> Self {
-        let parameters = if scale < 1.0 { vec![("scale", scale.to_string())] } else { Vec::new() };
+    /// All of `diagnose` at a scale in percent. How long that takes is not planned yet.
+    fn diagnose(percent: u32) -> Self {
+        let scale = f64::from(percent) / 100.0;
+        let parameters = if percent < 100 { vec![("scale", scale.to_string())] } else { Vec::new() };
         Self {
             experiment: "diagnose".into(),
             parameters,
             seed: None,
-            duration_s: scale * DIAGNOSE_S,
+            duration_s: f64::INFINITY,
             separates: [MISSING.into(), NOISE.into()],
             expected_z: None,
         }
@@ -308,6 +343,17 @@ impl ChosenExperiment {
     fn command(&self) -> String {
         command(&self.experiment, &self.parameters)
     }
+
+    /// Its parameters as `tactus run` takes them.
+    fn arguments(&self) -> Vec<String> {
+        self.parameters.iter().map(|(name, value)| format!("{name}={value}")).collect()
+    }
+
+    /// Why it is not begun.
+    fn is_too_long(&self, left_s: f64) -> String {
+        let (takes, left) = (duration(self.duration_s), duration(left_s));
+        format!("`{}` takes {takes}, and {left} of the budget are left", self.command())
+    }
 }
 
 fn undecided(found: &Discovery) -> Vec<AmbiguousEffect> {
@@ -326,15 +372,11 @@ impl<'a> ExperimentRunner<'a> {
             return Err(Failure::new(Exit::Usage, error).into());
         }
         let asked = args.embedded || args.rig_file.is_some();
-        let served = if asked {
-            None
-        } else {
-            let client = connection::runtime()?.block_on(connection::find(common))?;
-            client.map(|client| client.rig().to_owned())
-        };
-        let (live, first_line) = if let Some(name) = served {
+        let served = if asked { None } else { PlannedRig::served(common)? };
+        let (live, planned_on, first_line) = if let Some(PlannedRig { rig, .. }) = served {
+            let name = rig.name.clone();
             let line = format!("experiments run on the service at {} (rig {name:?})", common.endpoint);
-            (LiveRig { name, rig: None }, line)
+            (LiveRig { name, rig: None }, rig, line)
         } else {
             let rig = match &args.rig_file {
                 Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?.rig,
@@ -343,9 +385,9 @@ impl<'a> ExperimentRunner<'a> {
             let why = if asked { "as asked".into() } else { format!("no service at {}", common.endpoint) };
             let line =
                 format!("SIMULATED: experiments run on the embedded simulated rig {:?} ({why})", rig.name);
-            (LiveRig { name: rig.name.clone(), rig: Some(rig) }, line)
+            (LiveRig { name: rig.name.clone(), rig: Some(rig.clone()) }, rig, line)
         };
-        let runner = Self { common, args, live, budget_s: 60.0 * args.budget_min, runs: 0 };
+        let runner = Self { common, args, live, planned_on, budget_s: 60.0 * args.budget_min, runs: 0 };
         runner.say(&first_line);
         Ok(runner)
     }
@@ -357,6 +399,25 @@ impl<'a> ExperimentRunner<'a> {
         }
     }
 
+    /// The `diagnose` of which the data are if there are none: half of the budget is left for what it leaves open, if that suffices.
+    fn first(&self) -> anyhow::Result<ChosenExperiment> {
+        let planned_s = |one: &ChosenExperiment| self.planned_s(one);
+        let within = |most, budget_s| longest(ChosenExperiment::diagnose, most, budget_s, &planned_s);
+        let chosen = within(100, self.budget_s / 2.0).or_else(|_| within(LEAST_PERCENT, self.budget_s));
+        Ok(chosen.map_err(|why| Failure::new(Exit::Usage, why))?)
+    }
+
+    fn seed(&self, chosen: &ChosenExperiment) -> u64 {
+        chosen.seed.unwrap_or_else(|| self.args.seed.wrapping_add(self.runs))
+    }
+
+    /// How long an experiment takes, by a dry run.
+    fn planned_s(&self, chosen: &ChosenExperiment) -> Result<f64, String> {
+        let planned =
+            plan::duration_s(&self.planned_on, &chosen.experiment, &chosen.arguments(), self.seed(chosen));
+        planned.map_err(|error| format!("`{}` cannot be planned: {}", chosen.command(), in_words(&error)))
+    }
+
     fn run(&mut self, chosen: &ChosenExperiment) -> anyhow::Result<RunSummary> {
         let command = chosen.command();
         let [one, other] = &chosen.separates;
@@ -365,12 +426,11 @@ impl<'a> ExperimentRunner<'a> {
             "{command}: to distinguish {one} from {other}{expected}; {}",
             duration(chosen.duration_s)
         ));
-        let parameters = chosen.parameters.iter().map(|(name, value)| format!("{name}={value}"));
         let args = RunArgs {
             subject: RunSubject::from(ExperimentArgs {
                 experiment: chosen.experiment.clone(),
-                parameters: parameters.collect(),
-                seed: Some(chosen.seed.unwrap_or_else(|| self.args.seed.wrapping_add(self.runs))),
+                parameters: chosen.arguments(),
+                seed: Some(self.seed(chosen)),
             }),
             embedded: self.live.rig.is_some(),
             rig_file: self.args.rig_file.clone(),
