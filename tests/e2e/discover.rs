@@ -213,6 +213,27 @@ fn dead_elements_are_named_with_calibrates_evidence_and_the_grown_model_closes_t
     );
 }
 
+/// A draft that somebody stated.
+const STATED: &str = r#"
+schema = "tactus.draft/1"
+status = "drafted"
+
+[effect]
+name = "NAME"
+sentence = "While the tool touches, counts are added."
+stage = "readout"
+carrier = "counts"
+combine = "add"
+when = "in contact"
+law = "linear"
+numbers = { offset = 3.0, slope = 1.0 }
+
+[[effect.covariate]]
+name = "depth"
+unit = "mm"
+range = [0.0, 0.6]
+"#;
+
 /// Hides physics that no effect of the library is, diagnoses the rig, and discovers with an experiment that confirms the draft. Then makes the
 /// experiment with another seed on that rig, on the rig without hidden physics, and on one with the draft in its model; and discovers
 /// with the draft in the library.
@@ -265,9 +286,32 @@ fn is_drafted_and_confirmed(physics: &str, strength: f64, [stage, carrier, covar
     let weaker = hidden.replace(&format!("{strength:?}"), &format!("{:?}", 0.75 * strength));
     fs::write(folder.join("weaker.toml"), weaker).unwrap();
     let other = diagnosed(folder, &["--truth", "weaker.toml"], "3");
+    // The library also has a draft of another array, and one that no data show which have no temperature.
+    let drafts = folder.join("drafts");
+    let foreign = STATED.replace("NAME", "foreign").replace("law =", "weights = [1.0, 2.0]\nlaw =");
+    fs::write(drafts.join("foreign.toml"), foreign).unwrap();
+    let warm =
+        STATED.replace("NAME", "warm").replace("\"depth\"", "\"temperature\"").replace("\"mm\"", "\"C\"");
+    fs::write(drafts.join("warm.toml"), warm.replace("[0.0, 0.6]", "[20.0, 30.0]")).unwrap();
+    fs::create_dir(folder.join("other")).unwrap();
+    fs::write(folder.join("other/draft-7.toml"), "of an earlier result").unwrap();
     let said = tactus(folder, &[&["--json", "discover", &other, "--out", "other"], &library[..]].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
-    assert_eq!(named(&said.json()), ["draft-1"], "{}", said.json()["draft"]);
+    let found = said.json();
+    assert_eq!(named(&found), ["draft-1"], "{}", found["draft"]);
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains("drafts/foreign.toml: draft"), "{warnings}");
+    let not_shown = found["not_shown"].as_array().unwrap();
+    assert!(not_shown.iter().any(|one| one["effect"] == "warm"), "{not_shown:?}");
+    assert!(!folder.join("other/draft-7.toml").exists(), "{:?}", listed(&folder.join("other")));
+    let lab: Vec<&Value> = found["lab"].as_array().unwrap().iter().collect();
+    let names: Vec<&Value> = lab.iter().map(|one| &one["name"]).collect();
+    assert_eq!(names, ["draft-1", "warm"], "{lab:?}");
+    let version = &lab[0]["version"];
+    let shown = tactus(folder, &[&["--json", "effects", "show", "draft-1"], &library[..]].concat()).json();
+    assert_eq!(&shown["version"], version);
+    let model = fs::read_to_string(folder.join("other/model.toml")).unwrap();
+    assert!(model.contains(&format!("version = {version}")), "{model}");
 
     fs::write(folder.join("drafts/model.toml"), file.replace("tactus.draft/1", "tactus.model/1")).unwrap();
     let said = tactus(folder, &[&["discover", &other, "--out", "refused"], &library[..]].concat());

@@ -129,10 +129,15 @@ fn all_that_effects_says_is_one_object_for_programs() {
     };
     let added = effects(&["add", "draft-1.toml"]);
     assert_eq!(added, json!({ "name": "draft-1", "status": "confirmed", "file": "own/draft-1.toml" }));
+    let version_before = effects(&["show", "draft-1"])["version"].as_str().unwrap().to_owned();
     let renamed = effects(&["rename", "draft-1", "grounding"]);
     assert_eq!(renamed, json!({ "name": "grounding", "status": "confirmed", "file": "own/grounding.toml" }));
     let retired = effects(&["retire", "grounding"]);
     assert_eq!(retired, json!({ "name": "grounding", "status": "retired", "file": "own/grounding.toml" }));
+    let version = |shown: &serde_json::Value| shown["version"].as_str().unwrap().to_owned();
+    let while_retired = version(&effects(&["show", "grounding"]));
+    assert_eq!(while_retired, version_before, "neither a name nor a status is another version");
+    assert_eq!(while_retired.len(), 64);
     assert_eq!(effects(&["use", "grounding"]), renamed, "it is what it was before");
     let shown = effects(&["show", "grounding"]);
     assert_eq!(shown["file"], "own/grounding.toml");

@@ -71,8 +71,8 @@ pub struct LabEffect {
     pub name: String,
     /// What became of it.
     pub status: DraftStatus,
-    /// SHA-256 of its file, in hexadecimal: the version.
-    pub sha256: String,
+    /// Its version: the SHA-256 of its table with an empty name, in hexadecimal. A new name or status leaves it as it is.
+    pub version: String,
 }
 
 /// An analysed run.

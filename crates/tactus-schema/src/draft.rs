@@ -297,7 +297,10 @@ impl DraftFile {
     /// Checks that what speaks for the draft is there.
     fn check_evidence(&self) -> Result<(), WrongField> {
         if self.was == Some(DraftStatus::Retired) {
-            return Err(wrong("was", "must be what the draft was before a person withdrew it, not \"retired\""));
+            return Err(wrong(
+                "was",
+                "must be what the draft was before a person withdrew it, not \"retired\"",
+            ));
         }
         let is_stated =
             self.covariance.is_empty() && self.nearest.is_empty() && self.stated() != DraftStatus::Partial;
@@ -354,6 +357,14 @@ impl DraftFile {
             evidence: self.evidence.clone(),
             confirmation: self.confirmation.clone(),
         })
+    }
+
+    /// The text of which the SHA-256 is the draft's version: its table, with an empty name. It is the same under each name and status.
+    ///
+    /// # Errors
+    /// If the draft holds values that no file can.
+    pub fn versioned(draft: &Draft) -> Result<String, toml::ser::Error> {
+        toml::to_string(&RawDraft { name: String::new(), ..RawDraft::of(draft) })
     }
 
     /// The draft as an effect's definition.
@@ -529,7 +540,10 @@ fn check_curve(draft: &Draft, field: &str) -> Result<(), WrongField> {
 /// Checks a share of what was left that a draft closes, and its standard error. A draft that makes it worse closes less than nothing.
 fn check_share(field: &str, share: Option<f64>, se: Option<f64>) -> Result<(), WrongField> {
     if let Some(share) = share.filter(|share| !(share.is_finite() && *share <= 1.0)) {
-        return Err(wrong(format!("{field}.closed_share"), format!("must be finite and at most 1, not {share}")));
+        return Err(wrong(
+            format!("{field}.closed_share"),
+            format!("must be finite and at most 1, not {share}"),
+        ));
     }
     error(&format!("{field}.closed_share_se"), se)
 }

@@ -101,6 +101,17 @@ fn a_model_file_holds_its_drafts_whole() {
     let back = Model::from_toml(&model.to_toml().unwrap()).unwrap();
     assert_eq!(back, model, "the effect is the same definition again");
 
+    let versioned = |version: &str| {
+        let named = format!("name = \"draft-1\"\nversion = \"{version}\"\nparameters");
+        Model::from_toml(&text.replacen("name = \"draft-1\"\nparameters", &named, 1))
+    };
+    let hash = "5a".repeat(32);
+    let model = versioned(&hash).unwrap();
+    assert_eq!(model.effects[0].version.as_ref(), Some(&hash));
+    assert_eq!(Model::from_toml(&model.to_toml().unwrap()).unwrap(), model);
+    let told = versioned("new").unwrap_err().to_string();
+    assert!(told.contains("effect[0].version: must be the SHA-256 of a draft"), "{told}");
+
     let another = text.replacen("name = \"draft-1\"", "name = \"draft-2\"", 1);
     let told = Model::from_toml(&another).unwrap_err().to_string();
     assert!(told.contains("effect[0].draft.name: must be \"draft-2\" here"), "{told}");
@@ -207,9 +218,21 @@ fn damaged_numbers_are_refused_with_their_place() {
         ("folds = 5", "folds = 6", "evidence.folds: must be at most 5, not 6"),
         ("closed_share = 0.93", "closed_share = nan", "evidence.closed_share: must be finite and at most 1"),
         ("closed_share = 0.93", "closed_share = 1.2", "evidence.closed_share: must be finite and at most 1"),
-        ("closed_share_se = 0.04", "closed_share_se = -0.04", "evidence.closed_share_se: must be finite and not"),
-        ("strength_se = 0.02", "strength_se = inf", "confirmation.strength_se: must be finite and not negative"),
-        ("strength = 0.3", "closed_share = -inf\nstrength = 0.3", "confirmation.closed_share: must be finite"),
+        (
+            "closed_share_se = 0.04",
+            "closed_share_se = -0.04",
+            "evidence.closed_share_se: must be finite and not",
+        ),
+        (
+            "strength_se = 0.02",
+            "strength_se = inf",
+            "confirmation.strength_se: must be finite and not negative",
+        ),
+        (
+            "strength = 0.3",
+            "closed_share = -inf\nstrength = 0.3",
+            "confirmation.closed_share: must be finite",
+        ),
     ] {
         let text = confirmed().replacen(from, to, 1);
         assert_ne!(text, confirmed(), "{from}: {text}");
@@ -242,14 +265,23 @@ fn a_curve_that_gives_no_finite_number_is_refused_in_draft_and_model_files() {
     let table = "law = \"table\"\nat = [[0.0, 0.6]]\nvalues = [-1e308, 1e308]";
     for (text, want) in [
         (law("power", "{ scale = 1.0, exponent = -3.0 }"), "effect.numbers: must not give an effect beyond"),
-        (law("power", "{ scale = 1.0, exponent = -1e300 }"), "effect.numbers: must not give an effect beyond"),
+        (
+            law("power", "{ scale = 1.0, exponent = -1e300 }"),
+            "effect.numbers: must not give an effect beyond",
+        ),
         (law("exponential", "{ scale = 1e13, length = 1.0 }"), "it gives 1e13"),
-        (law("logarithm", "{ scale = 1.0, length = 1e-320 }"), "effect.numbers: must not give an effect beyond"),
+        (
+            law("logarithm", "{ scale = 1.0, length = 1e-320 }"),
+            "effect.numbers: must not give an effect beyond",
+        ),
         (
             law("periodic", "{ offset = 0.0, sine = 1.0, cosine = 1.0, per_unit = 1e308 }"),
             "effect.numbers.per_unit: must not give",
         ),
-        (law("linear", "{ offset = 3.0, slope = 0.0 }\nweights = [1.0, 1e12]"), "effect.weights: must not give"),
+        (
+            law("linear", "{ offset = 3.0, slope = 0.0 }\nweights = [1.0, 1e12]"),
+            "effect.weights: must not give",
+        ),
         (
             STATED.replacen("law = \"linear\"\nnumbers = { offset = 3.0, slope = 0.0 }", table, 1),
             "effect.values: must not give",
@@ -292,9 +324,27 @@ fn a_withdrawn_draft_must_have_what_taking_it_back_needs() {
     assert!(told.contains("confirmation: is missing: a draft is confirmed by a new measurement"), "{told}");
     let cut = cut.replacen("was = \"confirmed\"", "was = \"drafted\"", 1);
     assert!(DraftFile::from_toml(&cut).is_ok(), "it was never measured anew");
-    let told = DraftFile::from_toml(&text.replacen("\"confirmed\"", "\"retired\"", 1)).unwrap_err().to_string();
+    let told =
+        DraftFile::from_toml(&text.replacen("\"confirmed\"", "\"retired\"", 1)).unwrap_err().to_string();
     assert!(told.contains("was: must be what the draft was before"), "{told}");
     let stated = STATED.replacen("\"drafted\"", "\"retired\"\nwas = \"partial\"", 1);
     let told = DraftFile::from_toml(&stated).unwrap_err().to_string();
     assert!(told.contains("evidence: is missing"), "{told}");
+}
+
+/// Reports, libraries and models name a version by this text, so it stays as it is.
+#[test]
+fn a_version_is_of_all_that_the_effect_is_and_of_nothing_else() {
+    let mut read = DraftFile::from_toml(STATED).unwrap();
+    let text = DraftFile::versioned(&read.draft).unwrap();
+    assert_eq!(
+        text,
+        "name = \"\"\nsentence = \"While the tool touches, the counts of each element rise.\"\nstage = \"readout\"\n\
+         carrier = \"counts\"\ncombine = \"add\"\nwhen = \"in contact\"\nlaw = \"linear\"\n\n[numbers]\noffset = 3.0\nslope = 0.0\n\n\
+         [[covariate]]\nname = \"depth\"\nunit = \"mm\"\nrange = [0.0, 0.6]\n"
+    );
+    read.draft.name = "grounding".into();
+    assert_eq!(DraftFile::versioned(&read.draft).unwrap(), text);
+    read.draft.law = Law::Linear { offset: 3.0, slope: 1e-9 };
+    assert_ne!(DraftFile::versioned(&read.draft).unwrap(), text);
 }

@@ -76,6 +76,9 @@ pub struct KnownEffect {
     pub standard_errors: BTreeMap<String, f64>,
     /// The data that showed it; `None` if it was only stated.
     pub evidence: Option<Evidence>,
+    /// Version of the draft that it is: the SHA-256 of [`DraftFile::versioned`](crate::DraftFile::versioned), in hexadecimal. `None` of an
+    /// effect of the library, or if it is not stated.
+    pub version: Option<String>,
 }
 
 /// The data that show an effect, and how much it improves the predictions.

@@ -1,4 +1,4 @@
-//! Checksums of files.
+//! Checksums of files and texts.
 
 use std::fs::File;
 use std::io;
@@ -13,4 +13,9 @@ pub(crate) fn of_file(path: &Path) -> anyhow::Result<String> {
     let read = File::open(path).and_then(|mut file| io::copy(&mut file, &mut hash));
     read.with_context(|| path.display().to_string())?;
     Ok(format!("{:x}", hash.finalize()))
+}
+
+/// SHA-256 of a text, in hexadecimal.
+pub(crate) fn of_text(text: &str) -> String {
+    format!("{:x}", Sha256::digest(text))
 }

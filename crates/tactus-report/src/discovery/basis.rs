@@ -64,10 +64,10 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
         let mut table = Table::new(&[
             Column::Name("effect of the lab"),
             Column::Name("status"),
-            Column::Prose("SHA-256 of its file"),
+            Column::Prose("version (SHA-256 of its table)"),
         ]);
-        for LabEffect { name, status, sha256 } in report.lab {
-            table.row([name, status.name(), sha256]);
+        for LabEffect { name, status, version } in report.lab {
+            table.row([name, status.name(), version]);
         }
         writeln!(f, "<p>Tried beside the effects of the library:</p>\n{table}")?;
     }

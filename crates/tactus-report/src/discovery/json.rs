@@ -93,7 +93,7 @@ struct NotShownJson<'a> {
 struct LabEffectJson<'a> {
     name: &'a str,
     status: &'static str,
-    sha256: &'a str,
+    version: &'a str,
 }
 
 #[derive(Serialize)]
@@ -576,8 +576,8 @@ impl GlobalTestJson {
 }
 
 impl<'a> LabEffectJson<'a> {
-    fn of(LabEffect { name, status, sha256 }: &'a LabEffect) -> Self {
-        Self { name, status: status.name(), sha256 }
+    fn of(LabEffect { name, status, version }: &'a LabEffect) -> Self {
+        Self { name, status: status.name(), version }
     }
 }
 

@@ -216,7 +216,7 @@ fn the_json_keeps_its_form_to_the_byte() {
     let (array, data, notes) = (Array::digitacts(), data(), ["one note".to_owned()]);
     let settled = ["draft-1 is confirmed".to_owned()];
     let lab =
-        [LabEffect { name: "grounding".into(), status: DraftStatus::Confirmed, sha256: "5a".repeat(32) }];
+        [LabEffect { name: "grounding".into(), status: DraftStatus::Confirmed, version: "5a".repeat(32) }];
     let report = DiscoveryReport {
         notes: &notes,
         active: &active,
@@ -618,7 +618,7 @@ fn a_parameter_at_the_end_of_its_range_or_within_its_error_is_flagged() {
 #[test]
 fn the_effects_of_the_lab_are_told_with_their_version() {
     let (array, data, found) = (Array::digitacts(), data(), nothing_missing());
-    let lab = [LabEffect { name: "grounding".into(), status: DraftStatus::Drafted, sha256: "5a5a".into() }];
+    let lab = [LabEffect { name: "grounding".into(), status: DraftStatus::Drafted, version: "5a5a".into() }];
     let html = discovery_html(&DiscoveryReport { lab: &lab, ..report(&array, &data, &found) });
     assert!(html.contains("effect of the lab") && html.contains("grounding") && html.contains("5a5a"));
 }

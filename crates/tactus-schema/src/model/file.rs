@@ -86,6 +86,9 @@ struct RawReference {
 struct RawEffect {
     /// Name of the effect, of the library or of the draft.
     name: String,
+    /// Version of the draft, as the lab's library lists it: the SHA-256 of its table with an empty name, in hexadecimal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    version: Option<String>,
     /// Its parameters by name; the units are in the names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     parameters: BTreeMap<String, f64>,
@@ -241,6 +244,7 @@ impl RawEffect {
         });
         Self {
             name: known.effect.name().into(),
+            version: known.version.clone(),
             parameters: known.effect.parameters().map(|(name, value)| (name.into(), value)).collect(),
             knots,
             tables: known.effect.tables().map(|(name, table)| (name.into(), RawTable::of(table))).collect(),
@@ -286,7 +290,13 @@ impl RawEffect {
             not_negative(field, *se)?;
         }
         let evidence = self.evidence.map(|evidence| evidence.check(index)).transpose()?;
-        Ok(KnownEffect { effect, standard_errors: self.standard_errors, evidence })
+        let is_hash =
+            |version: &String| version.len() == 64 && version.chars().all(|one| one.is_ascii_hexdigit());
+        if self.version.as_ref().is_some_and(|version| definition.draft().is_none() || !is_hash(version)) {
+            let problem = "must be the SHA-256 of a draft, in hexadecimal; effects of the library have none";
+            return Err(wrong(format!("effect[{index}].version"), problem).into());
+        }
+        Ok(KnownEffect { effect, standard_errors: self.standard_errors, evidence, version: self.version })
     }
 }
 

@@ -93,7 +93,11 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     for one in &library {
         match one.of_another_array(&discovered.measured.rig.array) {
             Some(warning) => warnings.push(warning),
-            None => discovered.lab.push(one.for_report()?),
+            None => {
+                // As it is after the experiments of `--active`.
+                let now = discovered.remeasured.iter().find(|other| other.path == one.path).unwrap_or(one);
+                discovered.lab.push(now.for_report()?);
+            }
         }
     }
     discovered.discovery.warnings.extend(warnings);

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use tactus_model::Array;
+use tactus_model::effect::Draft;
 use tactus_report::discovery::LabEffect;
 use tactus_schema::DraftFile;
 
@@ -151,14 +152,22 @@ fn parsed(path: &Path) -> Result<DraftFile, String> {
     DraftFile::from_toml(&text).map_err(|error| error.to_string())
 }
 
+/// The version of a draft: a checksum of what it is, without its name and what became of it.
+///
+/// # Errors
+/// If the draft holds values that no file can.
+pub(crate) fn version(draft: &Draft) -> anyhow::Result<String> {
+    Ok(sha256::of_text(&DraftFile::versioned(draft).with_context(|| draft.name.clone())?))
+}
+
 impl Held {
     /// The draft as a report names it.
     ///
     /// # Errors
-    /// If the file cannot be read.
+    /// If the draft holds values that no file can.
     pub(crate) fn for_report(&self) -> anyhow::Result<LabEffect> {
-        let name = self.draft.draft.name.clone();
-        Ok(LabEffect { name, status: self.draft.status, sha256: sha256::of_file(&self.path)? })
+        let DraftFile { draft, status, .. } = &self.draft;
+        Ok(LabEffect { name: draft.name.clone(), status: *status, version: version(draft)? })
     }
 
     /// A warning if the draft is of another array than the data.

@@ -49,5 +49,5 @@ fn miswired(element: usize, answers_for: usize, other_share: f64) -> Option<Know
         ("other_share", other_share),
     ];
     let effect = Effect::new("miswired", parameters).ok()?;
-    Some(KnownEffect { effect, standard_errors: BTreeMap::new(), evidence: None })
+    Some(KnownEffect { effect, standard_errors: BTreeMap::new(), evidence: None, version: None })
 }

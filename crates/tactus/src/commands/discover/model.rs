@@ -5,6 +5,8 @@ use tactus_model::Effect;
 use tactus_schema::Model;
 use tactus_schema::model::{BaseModel, Evidence, KnownEffect};
 
+use crate::commands::library::version;
+
 /// The model with the discovered effects and the draft of what they leave, base and effects fitted jointly. Added effects have standard errors and name
 /// their data; effects known before keep their evidence.
 pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
@@ -27,6 +29,7 @@ pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
                 effect: effect.clone(),
                 standard_errors: [].into(),
                 evidence: known.and_then(|known| known.evidence.clone()),
+                version: version_of(effect),
             };
         };
         let errors =
@@ -39,6 +42,7 @@ pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
                 heldout_rms_before_counts: step.heldout_rms_before_counts,
                 heldout_rms_after_counts: step.heldout_rms_after_counts,
             }),
+            version: version_of(effect),
         }
     });
     Model { effects: effects.collect(), base: BaseModel { noise_rms_counts, ..base } }
@@ -54,7 +58,13 @@ fn drafted(draft: &DraftedEffect, effect: &Effect, data: &str) -> KnownEffect {
             heldout_rms_before_counts: draft.heldout_rms_before_counts,
             heldout_rms_after_counts: draft.heldout_rms_after_counts,
         }),
+        version: version_of(effect),
     }
+}
+
+/// The version of an effect that is a draft. One that no file can hold has none: no model file can hold it either.
+fn version_of(effect: &Effect) -> Option<String> {
+    effect.definition().draft().and_then(|draft| version(draft).ok())
 }
 
 /// The term of a step that belongs to this effect.

@@ -24,6 +24,7 @@ pub(crate) fn before() -> Model {
             heldout_rms_before_counts: 9.0,
             heldout_rms_after_counts: 3.0,
         }),
+        version: None,
     }];
     model
 }

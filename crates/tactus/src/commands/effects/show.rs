@@ -11,7 +11,7 @@ use tactus_schema::DraftFile;
 use tactus_schema::draft::{DraftStatus, stage_name};
 
 use crate::cli::Common;
-use crate::commands::library::{Held, Library};
+use crate::commands::library::{Held, Library, version};
 use crate::exit::{Exit, Failure};
 use crate::output::{print_fields, say, say_next};
 
@@ -95,6 +95,7 @@ fn show_draft(one: &Held, figure: Option<&Path>) {
         ("what it is", draft.sentence.clone()),
         ("status", format!("{}: {}", status.name(), status.meaning())),
         ("file", one.path.display().to_string()),
+        ("version", version(draft).unwrap_or_default()),
         ("stage", stage_name(draft.stage()).to_owned()),
         ("carrier", format!("{} ({})", draft.carrier.name(), draft.carrier.unit())),
         ("acts", draft.when.name().to_owned()),
@@ -189,6 +190,7 @@ pub(super) fn of_draft(one: &Held) -> Value {
         "status": status.name(),
         "was": was.map(DraftStatus::name),
         "file": one.path,
+        "version": version(draft).ok(),
         "stage": stage_name(draft.stage()),
         "summary": draft.sentence,
         "carrier": draft.carrier.name(),
