@@ -74,11 +74,12 @@ pub(super) fn sentence(draft: &Draft) -> String {
     let [least, most] = extent(draft);
     let (scale, of) =
         if draft.carrier.unit() == "share" { (100.0, "%") } else { (1.0, draft.carrier.unit()) };
-    if let Law::Linear { offset, slope: 0.0 } = &draft.law {
-        let [_, value] = numbers([0.0, scale * offset]);
+    let [least, most] = numbers([scale * least, scale * most]);
+    if let Law::Linear { slope: 0.0, .. } = &draft.law {
+        // With weights it is another constant for each element.
+        let value = if least == most { least } else { format!("{least} to {most}") };
         return format!("{}, {what}{own} that is constant: {value} {of}", capital(when));
     }
-    let [least, most] = numbers([scale * least, scale * most]);
     format!(
         "{}, {what}{own} that follows the {}, {how}: {least} to {most} {of}",
         capital(when),
@@ -94,14 +95,29 @@ fn unit(draft: &Draft) -> &'static str {
     }
 }
 
-/// The least and the greatest value of a draft within the range of its data.
+/// The least and the greatest value of a draft within the range of its data, of whichever element. A tone goes on, and has its whole amplitude
+/// somewhere; any other law is least and greatest at the ends of its range, and a table at its places.
 fn extent(draft: &Draft) -> [f64; 2] {
-    let values: Vec<f64> = if let Law::Table { values, .. } = &draft.law {
-        values.clone()
-    } else {
-        let [from, to] = draft.ranges[0];
-        (0..=100).map(|step| draft.law.value(&[from + (to - from) * f64::from(step) / 100.0])).collect()
+    let values: Vec<f64> = match &draft.law {
+        Law::Table { values, .. } => values.clone(),
+        Law::Periodic { offset, sine, cosine, .. } => {
+            let amplitude = sine.hypot(*cosine);
+            vec![offset - amplitude, offset + amplitude]
+        }
+        Law::Linear { .. }
+        | Law::Power { .. }
+        | Law::Exponential { .. }
+        | Law::Saturating { .. }
+        | Law::Threshold { .. }
+        | Law::Logarithm { .. } => draft.ranges[0].iter().map(|end| draft.law.value(&[*end])).collect(),
     };
+    let curve = ends(&values);
+    let Some(weights) = &draft.weights else { return curve };
+    let products = ends(weights).map(|weight| curve.map(|value| weight * value));
+    ends(products.as_flattened())
+}
+
+fn ends(values: &[f64]) -> [f64; 2] {
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
     [least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
 }
