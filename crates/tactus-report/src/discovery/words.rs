@@ -1,6 +1,8 @@
 //! The verdict of a discovery in words.
 
-use tactus_discover::{AddedEffect, Because, Closed, Discovery, Estimated, Floor, GivenUp, Round, Verdict};
+use tactus_discover::{
+    AddedEffect, Because, Closed, Discovery, Estimated, Floor, GivenUp, NoDraft, Round, Verdict,
+};
 use tactus_model::Effect;
 use tactus_model::effect::Definition;
 
@@ -81,12 +83,14 @@ pub fn in_words(found: &Discovery) -> String {
         ),
         Verdict::Explained => format!("The model was missing {added}. {falls}{bound}{}", tolerance(found)),
         Verdict::PartlyExplained => format!(
-            "The model was missing {added}, and something more that no known effect matches. {falls}{bound} {}",
+            "The model was missing {added}, and something more {}. {falls}{bound} {}",
+            unmatched(found),
             left(found)
         ),
         Verdict::Unexplained => format!(
-            "The model is missing something that no known effect matches: on held-out presses its residual is {before} counts rms and \
+            "The model is missing something {}: on held-out presses its residual is {before} counts rms and \
              {noise_is}.{bound} {}{}",
+            unmatched(found),
             left(found),
             nearest(found)
         ),
@@ -98,6 +102,16 @@ pub fn in_words(found: &Discovery) -> String {
         .chain(faulty::in_words(found))
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// How near the library comes to what is missing.
+fn unmatched(found: &Discovery) -> String {
+    match &found.draft {
+        Some(Err(NoDraft::Class(class))) => {
+            format!("that no effect explains well enough (the nearest is {class})")
+        }
+        Some(_) | None => "that no known effect matches".into(),
+    }
 }
 
 /// What is structured in the grown model's residual.

@@ -313,6 +313,18 @@ fn the_verdict_says_what_it_rests_on() {
 }
 
 #[test]
+fn what_a_class_explains_nearly_as_well_is_not_said_to_match_none() {
+    let nearly = Discovery { draft: Some(Err(NoDraft::Class("softening"))), ..unexplained() };
+    let told = in_words(&nearly);
+    let wanted = "The model is missing something that no effect explains well enough (the nearest is softening): on held-out presses";
+    assert!(told.starts_with(wanted), "{told}");
+    let partly = Discovery { verdict: Verdict::PartlyExplained, draft: nearly.draft, ..explained() };
+    let told = in_words(&partly);
+    let wanted = ", and something more that no effect explains well enough (the nearest is softening). On held-out presses";
+    assert!(told.contains(wanted), "{told}");
+}
+
+#[test]
 fn faulty_elements_are_listed_with_their_evidence_and_have_no_figure() {
     let discovery = faulty();
     assert_eq!(
