@@ -26,7 +26,7 @@ pub use next::{
 pub use progress::{Progress, Stage, TimeLeft};
 pub use search::{
     Because, Contest, Curve, Gap, GivenUp, NoDraft, NotShown, Options, Point, RefutedFormula, Rivalry, Round,
-    Rule, TriedEffect,
+    Rule, TriedEffect, rival_in_words,
 };
 pub use tactus_calibrate::{FaultKind, FaultyElement};
 

@@ -160,7 +160,7 @@ pub(crate) use draft::{Against, Drafted, Outcome};
 pub use forms::RefutedFormula;
 pub(crate) use forms::{Formed, Refuted};
 pub(crate) use given_up::last_words;
-pub use given_up::{Because, GivenUp};
+pub use given_up::{Because, GivenUp, rival_in_words};
 pub use grow::{ALPHA, FORM_SHARE, LEFT_SHARE, MISFIT_SHARE, Round, TriedEffect};
 pub(crate) use grow::{
     Alike, Equivalent, FLIPS, Grown, Left, POLISH_ROUNDS, Search, Tried, WORK_MOST, names, without,

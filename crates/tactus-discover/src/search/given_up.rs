@@ -1,5 +1,7 @@
 //! Effects that were fitted and are not in the grown model, and why.
 
+use super::varying::varying_effect;
+
 /// An effect that was fitted, and that the grown model does not have.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GivenUp {
@@ -42,14 +44,17 @@ impl GivenUp {
         }
     }
 
-    /// The reason as a clause, such as `a dependence on depth without a name explains more`.
+    /// The reason as a clause, such as `what explains more has no name in the library: a dependence on depth`.
     pub fn in_words(&self) -> String {
         match self.because {
-            Because::Rival(rival) => format!("a dependence on {rival} that is no effect explains more"),
+            // The library has the effect that varies.
+            Because::Rival(rival) if varying_effect(rival).is_some() => format!("{rival} explains more"),
+            Because::Rival(rival) => {
+                format!("what explains more has no name in the library: {}", rival_in_words(rival))
+            }
             Because::NearestForm(rival) => {
-                format!(
-                    "a dependence on {rival} that is no effect would take over much of it, and explains more beside it"
-                )
+                let rival = rival_in_words(rival);
+                format!("it is only the nearest form of what has no name in the library: {rival}")
             }
             Because::Little => "it explains too little by itself or beside the others".into(),
             Because::Other(other) => format!("{other} explains more in its place"),
@@ -60,6 +65,21 @@ impl GivenUp {
                 100.0 * share
             ),
         }
+    }
+}
+
+/// A rival without a name within a sentence, such as `a dependence on place`.
+pub fn rival_in_words(rival: &str) -> String {
+    if varying_effect(rival).is_some() {
+        return rival.to_owned();
+    }
+    // What it is, and not what it depends on.
+    if rival.starts_with("tone in ") || rival.starts_with("jump in ") {
+        return format!("a {rival}");
+    }
+    match rival.strip_suffix(", apart") {
+        Some(rival) => format!("a dependence on {rival}, loading and unloading apart"),
+        None => format!("a dependence on {rival}"),
     }
 }
 
@@ -74,3 +94,7 @@ pub(crate) fn last_words(all: Vec<GivenUp>, present: &[&str]) -> Vec<GivenUp> {
     }
     last
 }
+
+#[cfg(test)]
+#[path = "given_up_tests.rs"]
+mod tests;

@@ -13,11 +13,17 @@ use crate::{
 
 /// A structured residual that is certainly below this does not count.
 const HALF_NOISE: f64 = 0.5;
-/// Columns of the table of levels; the last one only where there is a draft.
-const LEVELS: [Column; 4] = [
+/// Columns of the table of levels.
+const LEVELS: [Column; 3] = [
     Column::Name("on held-out presses"),
     Column::Number("base model, recalibrated"),
     Column::Number("grown model"),
+];
+/// The same where there is a draft.
+const LEVELS_WITH_DRAFT: [Column; 4] = [
+    Column::Name("on held-out presses"),
+    Column::Number("base model, recalibrated"),
+    Column::Number("grown model without the draft"),
     Column::Number("with the draft"),
 ];
 
@@ -40,8 +46,9 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
         staircase(found),
         levels(found),
         found.final_.closed.map_or_else(String::new, |of_gap| format!(
-            "The grown model closes {} of the base model's gap. The share is the fall of the mean square, divided by the sum of that \
+            "The {} closes {} of the base model's gap. The share is the fall of the mean square, divided by the sum of that \
              fall and what lasts in the residual.",
+            words::grown_model(found),
             words::closed(of_gap)
         ))
     )
@@ -79,7 +86,7 @@ fn levels(found: &Discovery) -> Table<'static> {
         ("structured / noise", each(&|level| structured(level, |part| part.rms_noise))),
         ("structured at most (95 %) / noise", each(&|level| structured(level, |part| part.upper_noise))),
     ];
-    let mut table = Table::new(&LEVELS[..=levels.len()]);
+    let mut table = Table::new(if levels.len() < 3 { &LEVELS[..] } else { &LEVELS_WITH_DRAFT });
     for (name, values) in rows {
         table.row([name.to_owned()].into_iter().chain(values.into_iter().map(or_dash)));
     }
@@ -104,9 +111,10 @@ fn unexplained(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
         } else {
             writeln!(
                 f,
-                "<p class=\"warn\">What is left of the gap depends on {}, and no effect of the library explains it, so the grown model \
+                "<p class=\"warn\">What is left of the gap depends on {}, and no effect of the library explains it, so the {} \
                  does not contain it.</p>",
-                Text(on)
+                Text(on),
+                words::grown_model(found)
             )?;
         }
         if !found.unexplained.gap.is_empty() {

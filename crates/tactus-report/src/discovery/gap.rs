@@ -33,7 +33,8 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
         writeln!(
             f,
             "<h3>The residual against each covariate</h3>\n<p class=\"lead\">Means over nearby frames with their standard errors, for the recalibrated base model and for \
-             the grown model, if there is one. If a model is right, its residual is noise about zero.</p>\n<div class=\"multiples\">"
+             the {}, if there is one. If a model is right, its residual is noise about zero.</p>\n<div class=\"multiples\">",
+            words::grown_model(found)
         )?;
         for curve in &found.curves {
             writeln!(f, "{}", residual_against(curve))?;
@@ -65,7 +66,8 @@ fn brightest(found: &Discovery) -> String {
     match most(|gap| gap.after_rms_counts) {
         Some((_, after)) if after.to_bits() == rms.to_bits() => format!("{before}."),
         Some((other, after)) => {
-            format!("{before}; with the grown model that of element {other}, {}.", words::level(after, noise))
+            let (grown, level) = (words::grown_model(found), words::level(after, noise));
+            format!("{before}; with the {grown} that of element {other}, {level}.")
         }
         None => format!("{before}."),
     }

@@ -15,6 +15,8 @@ use crate::plot::number;
 const CLOSES_MUCH: f64 = 0.5;
 /// A share below this one rounds to no percent.
 const SHARE_LEAST: f64 = 0.000_5;
+/// After `closes`, of a share that is 0 or below.
+const NOTHING: &str = "nothing";
 /// Covariates that a sentence names.
 const NAMED_MOST: usize = 3;
 /// A parameter nearer to the end of its range than this share of it is at its end.
@@ -54,16 +56,7 @@ pub fn in_words(found: &Discovery) -> String {
         |noise| format!("the noise is {} counts, from {}", digits(noise, 3), found.floor.source()),
     );
     let bound = bound(found);
-    let closed = found.final_.closed.map_or_else(String::new, |of_gap| {
-        format!(", which closes {} of the gap between model and noise", closed(of_gap))
-    });
-    let falls = if found.base == found.final_.level {
-        format!("On held-out presses the residual is {before} counts rms; {noise_is}.")
-    } else {
-        format!(
-            "On held-out presses the residual falls from {before} to {after} counts rms{closed}; {noise_is}."
-        )
-    };
+    let falls = falls(found, [&before, &after], &noise_is);
     let verdict = match found.verdict {
         Verdict::CannotJudge if found.floor == Floor::None => format!(
             "Nothing can be judged: no frame and no press of these data repeats another, so noise and missing physics look the same. On \
@@ -102,6 +95,30 @@ pub fn in_words(found: &Discovery) -> String {
         .chain(faulty::in_words(found))
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// What the added effects do to the residual on held-out presses, from the base model to the grown one.
+fn falls(found: &Discovery, [before, after]: [&str; 2], noise_is: &str) -> String {
+    let Discovery { base, final_, steps, .. } = found;
+    if *base == final_.level {
+        return format!("On held-out presses the residual is {before} counts rms; {noise_is}.");
+    }
+    let goes = if before == after {
+        format!("stays at {after}")
+    } else if final_.level.heldout_rms_counts < base.heldout_rms_counts {
+        format!("falls from {before} to {after}")
+    } else {
+        format!("goes from {before} to {after}")
+    };
+    let closes = match final_.closed.map(closed) {
+        Some(share) if share == NOTHING => {
+            let them = if steps.len() == 1 { "it" } else { "them" };
+            format!(": held-out presses do not show {them}")
+        }
+        Some(share) => format!(", which closes {share} of the gap between model and noise"),
+        None => String::new(),
+    };
+    format!("On held-out presses the residual {goes} counts rms{closes}; {noise_is}.")
 }
 
 /// How near the library comes to what is missing.
@@ -294,6 +311,14 @@ fn or_others(step: &AddedEffect) -> String {
     format!("{} (or {})", step.effect, either(&step.equivalent))
 }
 
+/// The model of which residuals are told beside those of the base model. The model file has the draft as well.
+pub(super) fn grown_model(found: &Discovery) -> &'static str {
+    match &found.draft {
+        Some(Ok(_)) => "grown model without the draft",
+        Some(Err(_)) | None => "grown model",
+    }
+}
+
 /// The definition of an added effect; `None` of a random walk, which is no effect of the model. A draft is in no registry.
 pub fn definition(found: &Discovery, step: &AddedEffect) -> Option<&'static Definition> {
     let own = found.effects.iter().find(|effect| effect.name() == step.effect).map(Effect::definition);
@@ -357,14 +382,14 @@ pub(super) fn percent(share: f64) -> String {
 
 /// A share after `closes`: `97 %` or `nothing`.
 fn closes(share: f64) -> String {
-    if share < SHARE_LEAST { "nothing".into() } else { percent(share) }
+    if share < SHARE_LEAST { NOTHING.into() } else { percent(share) }
 }
 
 /// Such as `83 % +- 6 %` or `99.96 % +- 0.03 %`; `nothing` of a share that is 0 or below.
 pub fn closed(of_gap: Closed) -> String {
     let (share, error) = closed_and_error(of_gap);
     if of_gap.share <= 0.0 || !share.contains(|letter| matches!(letter, '1'..='9')) {
-        return "nothing".into();
+        return NOTHING.into();
     }
     error.map_or_else(|| share.clone(), |error| format!("{share} +- {error}"))
 }

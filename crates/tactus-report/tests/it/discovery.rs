@@ -294,7 +294,8 @@ fn the_verdict_says_what_it_rests_on() {
         "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms and the noise \
          is 2.00 counts, from repeats of a place. Of readings with a signal, 4.6 times the noise (9.1 counts) is not noise; with 95 % \
          confidence it is at most 5.7 times the noise (11 counts). What is left depends on time since contact and depth. \
-         hysteresis alone would close 82 % of it, but is not named: a dependence on place along x that is no effect explains more."
+         hysteresis alone would close 82 % of it, but is not named: what explains more has no name in the library: a dependence on place along \
+         x."
     );
     assert_eq!(
         in_words(&cannot_judge()),
@@ -310,6 +311,22 @@ fn the_verdict_says_what_it_rests_on() {
     assert!(in_words(&partly).ends_with(
         "What is left depends on temperature. Faulty: element 18 answers for 19 and element 19 answers for 18."
     ));
+}
+
+#[test]
+fn a_residual_falls_only_where_it_does_and_what_closes_nothing_is_not_shown() {
+    let mut found = explained();
+    let level = |found: &mut Discovery, counts| found.final_.level.heldout_rms_counts = counts;
+    found.base.heldout_rms_counts = 3.49;
+    found.final_.closed = Some(Closed { share: -0.01, standard_error: None, most: f64::INFINITY });
+    level(&mut found, 3.501);
+    let told = in_words(&found);
+    let wanted = "On held-out presses the residual goes from 3.49 to 3.50 counts rms: held-out presses do not show them; the noise";
+    assert!(told.contains(wanted), "{told}");
+    found.steps.truncate(1);
+    level(&mut found, 3.491);
+    let told = in_words(&found);
+    assert!(told.contains("the residual stays at 3.49 counts rms: held-out presses do not show it; the noise"), "{told}");
 }
 
 #[test]
@@ -728,12 +745,15 @@ fn the_headline_and_the_levels_tell_what_a_draft_gains() {
     for text in [
         "<dt>with draft-1 / counts</dt><dd>2.11 <small>1.05 &#215; noise</small></dd>",
         "<dt>draft-1 closes, of what is left</dt><dd>93 % <small>&#177; 4 %</small></dd>",
+        "<th class=\"n\">grown model without the draft</th>",
         "<th class=\"n\">with the draft</th>",
+        "no effect of the library explains it, so the grown model without the draft does not contain it.",
         "<td>residual / noise</td><td class=\"n\">4.68</td><td class=\"n\">4.68</td><td class=\"n\">1.05</td>",
     ] {
         assert!(page.contains(text), "{text}");
     }
-    assert!(!html(&unexplained()).contains("with the draft"));
+    let page = html(&unexplained());
+    assert!(!page.contains("with the draft") && page.contains("so the grown model does not contain it."));
 }
 
 #[test]
