@@ -72,12 +72,17 @@ impl Contest {
         Self { effect, ln_odds, rivals, classes: Vec::new(), left, kept: false }
     }
 
+    /// The rival with the greatest odds in the place of the class, if there is one.
+    pub(super) fn strongest(&self) -> Option<&'static str> {
+        let strongest = self.rivals.iter().max_by(|a, b| a.instead.total_cmp(&b.instead));
+        strongest.map(|strongest| strongest.rival)
+    }
+
     /// That the class was given up, if it is no name.
     pub(crate) fn given_up(&self) -> Option<GivenUp> {
-        let strongest = || self.rivals.iter().max_by(|a, b| a.instead.total_cmp(&b.instead));
         let because = match self.nearest_form_of() {
             Some(rival) => Because::NearestForm(rival),
-            None => strongest().map_or(Because::Little, |strongest| Because::Rival(strongest.rival)),
+            None => self.strongest().map_or(Because::Little, Because::Rival),
         };
         (!self.kept).then_some(GivenUp { effect: self.effect, because })
     }

@@ -37,6 +37,8 @@ pub struct Round {
     pub candidates: Vec<TriedEffect>,
     /// The effect that was added, if any.
     pub taken: Option<&'static str>,
+    /// The rival without a name that explains more than the best effect that was fitted, so that none was added.
+    pub rival: Option<&'static str>,
 }
 
 /// An effect that was tried.
@@ -259,11 +261,13 @@ impl Search<'_> {
             } else {
                 (Vec::new(), None)
             };
-            grown.refused.extend(refused);
             for fit in &fits {
                 self.tell(fit, &mut tried.round);
             }
-            let (taken, small) = match fits.into_iter().next() {
+            tried.round.rival = refused.as_ref().and_then(Contest::strongest);
+            let best = fits.into_iter().next().filter(|_| refused.is_none());
+            grown.refused.extend(refused);
+            let (taken, small) = match best {
                 Some(best) if best.ln_odds > least => (Some(best), None),
                 best => (None, best.filter(|best| best.ln_odds > LN_ODDS_LEAST)),
             };
@@ -345,7 +349,12 @@ impl Search<'_> {
             (of.definition, if has_walk { f64::INFINITY } else { widest })
         };
         Tried {
-            round: Round { with: names(&at.parameters, self.known_terms), candidates, taken: None },
+            round: Round {
+                with: names(&at.parameters, self.known_terms),
+                candidates,
+                taken: None,
+                rival: None,
+            },
             p_value,
             reach: self.candidates.iter().enumerate().map(reach).collect(),
         }
@@ -358,8 +367,8 @@ impl Search<'_> {
         }
     }
 
-    /// The classes of the best sets, fitted, the one with the greatest odds first; none if a rival without a name explains more: then
-    /// the best one's contest. None are fitted if their first steps promise far less than `least`.
+    /// The classes of the best sets, fitted, the one with the greatest odds first; and its contest if a rival without a name explains more: then
+    /// none of them is added. None are fitted if their first steps promise far less than `least`.
     fn next(
         &self,
         grown: &Grown,
@@ -402,7 +411,7 @@ impl Search<'_> {
                 starts.push((RANDOM_WALK.name, vec![walk.start.clone()]));
             }
         }
-        let mut fits = self.fits(at, &starts, 0.0)?;
+        let fits = self.fits(at, &starts, 0.0)?;
         let best_has_names = best_set.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
         let contest = |one: &Beside| {
             let (strength, mut rivals) = pass.rivalry(one.name, one.ln_odds);
@@ -412,9 +421,6 @@ impl Search<'_> {
             is_beaten.then(|| Contest::lost(one.name, one.ln_odds, self.left_over(&one.fitted), rivals))
         };
         let refused = fits.first().and_then(contest);
-        if refused.is_some() {
-            fits.clear();
-        }
         Ok((fits, refused))
     }
 

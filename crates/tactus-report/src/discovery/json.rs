@@ -195,6 +195,7 @@ struct RoundJson<'a> {
     with: &'a [&'static str],
     candidates: Vec<CandidateJson<'a>>,
     taken: Option<&'a str>,
+    rival: Option<&'a str>,
 }
 
 #[derive(Serialize)]
@@ -609,6 +610,7 @@ impl<'a> RoundJson<'a> {
             with: &round.with,
             candidates: round.candidates.iter().map(CandidateJson::of).collect(),
             taken: round.taken,
+            rival: round.rival,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_discover::{Because, Discovery, Round, TriedEffect};
+use tactus_discover::{Because, Discovery, Round, TriedEffect, rival_in_words};
 
 use super::words::{WouldClose, because, list, percent};
 use crate::{
@@ -74,7 +74,10 @@ fn fate(round: &Round, effect: &str, found: &Discovery) -> String {
         Some(taken) if taken != effect => format!("not taken: {taken} has greater odds"),
         Some(_) if found.steps.iter().any(|step| step.effect == effect) => "taken".into(),
         Some(_) => "taken, given up later".into(),
-        None => "not taken".into(),
+        None => round.rival.map_or_else(
+            || "not taken".to_owned(),
+            |rival| format!("not taken: {}, which has no name, explains more", rival_in_words(rival)),
+        ),
     }
 }
 
@@ -128,9 +131,13 @@ fn round(f: &mut fmt::Formatter<'_>, nth: usize, found: &Discovery) -> fmt::Resu
         });
         writeln!(f, "<p class=\"lead\">Scored only: {}.</p>", Text(list(scored)))?;
     }
-    match round.taken {
-        Some(_) => Ok(()),
-        None if is_any => writeln!(f, "<p>None was taken: none of them raises the odds enough.</p>"),
-        None => writeln!(f, "<p>None was fitted, so none was taken.</p>"),
+    match (round.taken, round.rival) {
+        (Some(_), _) => Ok(()),
+        (None, Some(rival)) => {
+            let rival = rival_in_words(rival);
+            writeln!(f, "<p>None was taken: {}, which has no name, explains more.</p>", Text(rival))
+        }
+        (None, None) if is_any => writeln!(f, "<p>None was taken: none of them raises the odds enough.</p>"),
+        (None, None) => writeln!(f, "<p>None was fitted, so none was taken.</p>"),
     }
 }

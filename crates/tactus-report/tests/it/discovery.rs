@@ -653,6 +653,19 @@ fn the_effects_of_the_lab_are_told_with_their_version() {
 }
 
 #[test]
+fn what_was_fitted_and_lost_against_a_rival_is_told_with_what_it_closes() {
+    let page = html(&unexplained());
+    for text in [
+        "<td class=\"n\">82 %</td><td class=\"prose\">not taken: a dependence on place along x, which has no name, explains more</td>",
+        "<p>None was taken: a dependence on place along x, which has no name, explains more.</p>",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    assert!(!page.contains("None was fitted"));
+    assert_eq!(json(&unexplained())["rounds"][0]["rival"], "place along x");
+}
+
+#[test]
 fn a_share_that_is_closed_beside_others_is_not_told_as_if_it_were_closed_alone() {
     let whole = unexplained();
     let first = &whole.rounds[0].candidates[0];
@@ -663,6 +676,7 @@ fn a_share_that_is_closed_beside_others_is_not_told_as_if_it_were_closed_alone()
             .map(|(effect, shrink)| TriedEffect { effect, shrink: Some(*shrink), ..first.clone() })
             .collect(),
         taken,
+        rival: None,
     };
     let pair = ["indenter-size", "edge-effect"];
     let given_up = |effect, because| GivenUp { effect, because };

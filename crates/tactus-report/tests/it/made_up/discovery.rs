@@ -259,7 +259,12 @@ pub(crate) fn unexplained() -> Discovery {
             level: whole.base,
             closed: Some(Closed { share: 0.0, standard_error: None, most: f64::INFINITY }),
         },
-        rounds: vec![Round { with: vec![], taken: None, ..whole.rounds[0].clone() }],
+        rounds: vec![Round {
+            with: vec![],
+            taken: None,
+            rival: Some("place along x"),
+            ..whole.rounds[0].clone()
+        }],
         steps: vec![],
         tentative: vec![],
         inclusions: vec![],
@@ -365,11 +370,13 @@ fn rounds() -> Vec<Round> {
                 tried("crosstalk", 1.1, 1.0, None),
             ],
             taken: Some("hysteresis"),
+            rival: None,
         },
         Round {
             with: vec!["misregistration"],
             candidates: vec![tried("gain-drift", 30.1, 0.000_5, Some((6.0, 0.61)))],
             taken: Some("gain-drift"),
+            rival: None,
         },
         Round {
             with: vec!["misregistration", "hysteresis"],
@@ -378,11 +385,13 @@ fn rounds() -> Vec<Round> {
                 tried("hardening", 2.2, 0.93, None),
             ],
             taken: Some("miswired"),
+            rival: None,
         },
         Round {
             with: vec!["misregistration", "hysteresis", "miswired"],
             candidates: vec![tried("hardening", 1.9, 0.97, None)],
             taken: None,
+            rival: None,
         },
     ]
 }
