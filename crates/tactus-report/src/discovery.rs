@@ -35,6 +35,7 @@ pub use draft::status as draft_status;
 pub use figures::{
     draft_curve, draft_picture, draft_weights, element_maps, free_curve, residual_against, staircase,
 };
+pub use gap::gap_in_words;
 pub use json::discovery_json;
 pub use next::{Proposal, not_proposed, nothing_open, open, proposals};
 pub use words::{closed, definition, flags, in_words};

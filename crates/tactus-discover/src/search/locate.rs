@@ -16,6 +16,8 @@ pub struct Gap {
     pub covariate: &'static str,
     /// Unit of the covariate, such as `s`.
     pub unit: &'static str,
+    /// The element at which alone the residual is largest; `None` if the dependence is not that of one element.
+    pub element: Option<usize>,
     /// Range of the covariate in which the residual is largest.
     pub range: [f64; 2],
     /// Root mean square of the dependence, in standard deviations of the noise.
@@ -120,6 +122,7 @@ impl Search<'_> {
             gap.push(Gap {
                 covariate,
                 unit: feature.unit,
+                element: feature.only(),
                 range: feature.range,
                 effect_size: z.abs() / (readings.max(1) as f64).sqrt(),
                 q_value,

@@ -98,13 +98,19 @@ fn table(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     )
 }
 
+/// On what a residual depends, such as `element and depth (element 17)`.
+pub fn gap_in_words(gap: &Gap) -> String {
+    let element = gap.element.map_or_else(String::new, |element| format!(" (element {element})"));
+    format!("{}{element}", gap.covariate)
+}
+
 /// On what a residual depends, and where it is largest.
 pub(super) fn table_of(gap: &[Gap]) -> Table<'static> {
     let mut table = Table::new(&COLUMNS);
     for gap in gap {
         let [from, to] = words::ends(gap.range);
         let size = digits(gap.effect_size, 3);
-        table.row([gap.covariate, &from, &to, gap.unit, &size, &probability(gap.q_value)]);
+        table.row([gap_in_words(gap).as_str(), &from, &to, gap.unit, &size, &probability(gap.q_value)]);
     }
     table
 }

@@ -157,6 +157,7 @@ struct GlobalTestJson {
 struct GapJson<'a> {
     #[serde(rename = "where")]
     place: GapPlaceJson<'a>,
+    element: Option<usize>,
     effect_size: f64,
     q_value: f64,
 }
@@ -586,6 +587,7 @@ impl<'a> GapJson<'a> {
     fn of(gap: &'a Gap) -> Self {
         Self {
             place: GapPlaceJson { covariate: gap.covariate, unit: gap.unit, range: gap.range },
+            element: gap.element,
             effect_size: gap.effect_size,
             q_value: gap.q_value,
         }

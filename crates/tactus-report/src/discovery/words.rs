@@ -1,10 +1,11 @@
 //! The verdict of a discovery in words.
 
 use tactus_discover::{
-    AddedEffect, Because, Closed, Discovery, Estimated, Floor, GivenUp, NoDraft, Round, Verdict,
+    AddedEffect, Because, Closed, Discovery, Estimated, FittedCurve, FittedKnot, Floor, GivenUp, NoDraft,
+    Round, Verdict,
 };
 use tactus_model::Effect;
-use tactus_model::effect::Definition;
+use tactus_model::effect::{Definition, ParameterKind};
 
 use super::active::command;
 use super::faulty;
@@ -325,30 +326,82 @@ pub fn definition(found: &Discovery, step: &AddedEffect) -> Option<&'static Defi
     own.or_else(|| Definition::find(step.effect).ok())
 }
 
-/// The parameters of an added effect that are at the end of their range or that the data hardly determine, a sentence each.
+/// The parameters, knots and tables of an added effect that are at the end of their range, that the data hardly determine, or of which no error is
+/// known; a sentence each.
 pub fn flags(found: &Discovery, step: &AddedEffect) -> Vec<String> {
     let Some(definition) = definition(found, step) else { return Vec::new() };
-    step.terms.iter().flatten().filter_map(|parameter| flag(definition, parameter)).collect()
+    let of_parameters = step.terms.iter().flatten().filter_map(|parameter| flag(definition, parameter));
+    let of_curves = step.curves.iter().flat_map(|curve| flags_of_curve(definition, curve));
+    let mut flags: Vec<String> = Vec::new();
+    for said in of_parameters.chain(of_curves) {
+        // Terms of one effect may say the same.
+        if !flags.contains(&said) {
+            flags.push(said);
+        }
+    }
+    flags
 }
+
+/// Effects that are no fit: calibration and the converter's codes tell them.
+const FAULTS: [&str; 2] = ["miswired", "quantisation"];
 
 fn flag(definition: &Definition, found: &Estimated) -> Option<String> {
     let known = definition.parameters.iter().find(|known| known.name == found.name)?;
-    let error = found.standard_error?;
-    let Estimated { name, value, .. } = found;
+    let Estimated { name, value, standard_error } = *found;
     let slack = BOUND_SHARE * (known.range[1] - known.range[0]);
-    if let Some(end) = known.range.into_iter().find(|end| (value - end).abs() <= slack) {
+    let is_neutral = (value - known.neutral).abs() <= slack;
+    let is_at_end = known.range.into_iter().any(|end| (value - end).abs() <= slack);
+    let Some(error) = standard_error else {
+        let is_fitted = known.kind == ParameterKind::Real && !FAULTS.contains(&definition.name);
+        // A neutral one may have been left so.
+        return (is_fitted && !is_neutral).then(|| {
+            let open = || format!("{name}: no error is known, so these data may hardly determine it.");
+            if is_at_end { at_end(name) } else { open() }
+        });
+    };
+    if is_at_end {
         // Many parameters do nothing at the end of their range, and may be there.
-        let is_neutral = (end - known.neutral).abs() <= slack;
-        let what = if is_neutral {
-            "does nothing"
-        } else {
-            "is at the end of its range: the true value may lie beyond"
-        };
-        return Some(format!("{name} {what}."));
+        return Some(if is_neutral { format!("{name} does nothing.") } else { at_end(name) });
     }
     (value.abs() < error).then(|| {
         format!("{name} has a standard error greater than its value: these data hardly determine it.")
     })
+}
+
+fn at_end(name: &str) -> String {
+    format!("{name} is at the end of its range: the true value may lie beyond.")
+}
+
+/// What is said of the knots of a free curve, or of a parameter's table. At 0 an error is greater than the value, so that counts only if it is
+/// so of all.
+fn flags_of_curve(definition: &Definition, curve: &FittedCurve) -> Vec<String> {
+    let of_table = definition.parameters.iter().find(|known| curve.is_table() && known.name == curve.of);
+    let of_knots = definition.curve.as_ref().filter(|known| !curve.is_table() && known.of == curve.of);
+    let known = of_table.map(|known| (known.range, known.neutral));
+    let Some((range, neutral)) = known.or_else(|| of_knots.map(|known| (known.range, 0.0))) else {
+        return Vec::new();
+    };
+    let slack = BOUND_SHARE * (range[1] - range[0]);
+    let is = |value: f64, other: f64| (value - other).abs() <= slack;
+    let knots = &curve.knots;
+    let count = |is_wanted: &dyn Fn(&FittedKnot) -> bool| {
+        let wanted = knots.iter().filter(|knot| is_wanted(knot)).count();
+        let verb = if wanted == 1 { "is" } else { "are" };
+        (wanted > 0).then(|| (format!("{wanted} of the {} values of {}", knots.len(), curve.of), verb))
+    };
+    let at_end =
+        |knot: &FittedKnot| range.into_iter().any(|end| is(knot.value, end)) && !is(knot.value, neutral);
+    let at_end = count(&at_end).map(|(which, verb)| {
+        format!("{which} {verb} at the end of the range: the true curve may lie beyond.")
+    });
+    let unknown = count(&|knot| knot.standard_error.is_none() && !is(knot.value, neutral))
+        .map(|(which, _)| format!("{which}: no error is known, so these data may hardly determine them."));
+    let is_weak = |knot: &FittedKnot| knot.standard_error.is_some_and(|error| knot.value.abs() < error);
+    let weak = (!knots.is_empty() && knots.iter().all(is_weak)).then(|| {
+        let of = curve.of;
+        format!("All values of {of} have a standard error greater than they are: these data hardly determine them.")
+    });
+    at_end.into_iter().chain(unknown).chain(weak).collect()
 }
 
 /// `a`, `a or b`, `a, b or c`.

@@ -18,7 +18,8 @@ use tactus_model::effect::Definition;
 use tactus_model::{Array, Effect};
 use tactus_report::discovery::{
     ActiveRun, AmbiguousEffect, DiscoveryReport, LabEffect, closed, discovery_html, discovery_json,
-    element_maps, in_words, not_proposed, not_shown, proposals, residual_against, staircase,
+    element_maps, flags, gap_in_words, in_words, not_proposed, not_shown, proposals, residual_against,
+    staircase,
 };
 use tactus_schema::draft::DraftStatus;
 
@@ -326,7 +327,10 @@ fn a_residual_falls_only_where_it_does_and_what_closes_nothing_is_not_shown() {
     found.steps.truncate(1);
     level(&mut found, 3.491);
     let told = in_words(&found);
-    assert!(told.contains("the residual stays at 3.49 counts rms: held-out presses do not show it; the noise"), "{told}");
+    assert!(
+        told.contains("the residual stays at 3.49 counts rms: held-out presses do not show it; the noise"),
+        "{told}"
+    );
 }
 
 #[test]
@@ -642,6 +646,67 @@ fn a_parameter_at_the_end_of_its_range_or_within_its_error_is_flagged() {
     }
     assert!(!self::html(&explained()).contains("end of its range"));
     assert_eq!(json(&explained())["steps"][0]["flags"].to_string(), "[]");
+}
+
+#[test]
+fn a_parameter_or_a_curve_without_an_error_is_tested_too() {
+    let mut discovery = explained();
+    let of_step = |discovery: &Discovery| flags(discovery, &discovery.steps[0]);
+    let range = Definition::find("hysteresis").unwrap().parameters[0].range;
+    let loss_share = &mut discovery.steps[0].terms[0][0];
+    (loss_share.value, loss_share.standard_error) = (0.5 * range[1], None);
+    let told = ["loss_share: no error is known, so these data may hardly determine it."];
+    assert_eq!(of_step(&discovery), told);
+    let again = discovery.steps[0].terms[0].clone();
+    discovery.steps[0].terms.push(again);
+    assert_eq!(of_step(&discovery), told, "two terms say it once");
+    for term in &mut discovery.steps[0].terms {
+        term[0].value = range[1];
+    }
+    assert_eq!(
+        of_step(&discovery),
+        ["loss_share is at the end of its range: the true value may lie beyond."]
+    );
+
+    let hardening = Definition::find("hardening").unwrap();
+    let curve = hardening.curve.as_ref().unwrap();
+    let step = &mut discovery.steps[0];
+    (step.effect, step.terms) = (hardening.name, Vec::new());
+    let knot = |at, value, standard_error| FittedKnot { at, value, standard_error };
+    let [_, most] = curve.range;
+    let knots = vec![knot(0.1, 0.0, None), knot(0.2, 0.5 * most, None), knot(0.3, most, Some(0.1))];
+    step.curves = vec![FittedCurve { at: curve.at, of: curve.of, knots, formula: None }];
+    assert_eq!(
+        of_step(&discovery),
+        [
+            format!(
+                "1 of the 3 values of {} is at the end of the range: the true curve may lie beyond.",
+                curve.of
+            ),
+            format!(
+                "1 of the 3 values of {}: no error is known, so these data may hardly determine them.",
+                curve.of
+            ),
+        ]
+    );
+    discovery.steps[0].curves[0].knots = vec![knot(0.1, 0.01, Some(0.1)), knot(0.2, -0.02, Some(0.1))];
+    assert_eq!(
+        of_step(&discovery),
+        [format!(
+            "All values of {} have a standard error greater than they are: these data hardly determine them.",
+            curve.of
+        )]
+    );
+}
+
+#[test]
+fn the_element_at_which_alone_a_residual_is_largest_is_named() {
+    let mut found = explained();
+    (found.gap[0].covariate, found.gap[0].element) = ("element and depth", Some(17));
+    assert_eq!(gap_in_words(&found.gap[0]), "element and depth (element 17)");
+    assert!(html(&found).contains("<td>element and depth (element 17)</td>"));
+    let gap = &json(&found)["gap"];
+    assert_eq!((&gap[0]["element"], &gap[1]["element"]), (&Value::from(17), &Value::Null));
 }
 
 #[test]

@@ -411,7 +411,7 @@ fn lacks(effect: &'static str, reason: &str) -> NotShown {
 }
 
 fn gap(covariate: &'static str, unit: &'static str, range: [f64; 2], effect_size: f64, q_value: f64) -> Gap {
-    Gap { covariate, unit, range, effect_size, q_value }
+    Gap { covariate, unit, element: None, range, effect_size, q_value }
 }
 
 fn tried(effect: &'static str, score: f64, p_value: f64, fitted: Option<(f64, f64)>) -> TriedEffect {

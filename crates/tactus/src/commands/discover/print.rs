@@ -6,8 +6,8 @@ use tactus_calibrate::Estimate;
 use tactus_discover::{AddedEffect, Discovery, DraftedEffect, Estimated, FittedCurve, Level};
 use tactus_model::effect::Definition;
 use tactus_report::discovery::{
-    AmbiguousEffect, DiscoveryReport, Proposal, closed, command, definition, draft_status, flags, in_words,
-    not_proposed, not_shown, proposals,
+    AmbiguousEffect, DiscoveryReport, Proposal, closed, command, definition, draft_status, flags,
+    gap_in_words, in_words, not_proposed, not_shown, proposals,
 };
 
 use crate::commands::calibrate::{estimate, faulty};
@@ -34,7 +34,7 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
         let rows = found.gap.iter().map(|gap| {
             let [from, to] = gap.range;
             let range = format!("{from:.3} to {to:.3} {}", gap.unit);
-            vec![gap.covariate.into(), range, format!("{:.2}", gap.effect_size), probability(gap.q_value)]
+            vec![gap_in_words(gap), range, format!("{:.2}", gap.effect_size), probability(gap.q_value)]
         });
         print_table(&["depends on", "most in", "in noise units", "q"], &rows.collect::<Vec<_>>());
     }
