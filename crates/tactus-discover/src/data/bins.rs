@@ -21,6 +21,10 @@ const BLOCK_S: f64 = 3.0;
 const STRETCH_S: f64 = 10.0;
 /// One press in this many is held out.
 const HELDOUT_ONE_IN: usize = 3;
+/// All presses of one value are held out if there are so many different ones: two on either side, or nearly.
+const SETTINGS_LEAST: usize = 4;
+/// A value that occurs so many times is a setting.
+const OFTEN: usize = 4;
 
 /// Bins in order of time, run by run.
 #[derive(Debug)]
@@ -166,7 +170,7 @@ impl Bins {
 
 impl HeldOut {
     /// Holds out one press in three with the rest that follows it. If the data have several coverings, or else several depths,
-    /// all presses of one of them are held out.
+    /// all presses of one of them are held out, if these are no more than a third.
     pub(crate) fn choose(frames: &Frames, seed: u64) -> Self {
         let mut rng = Rng::new(seed);
         let presses = PressSpan::of(frames);
@@ -267,14 +271,25 @@ fn rests(frames: &Frames, presses: &[PressSpan], rng: &mut Rng, out: &mut [bool]
     }
 }
 
-/// The middle one of at least four different values, if each occurs often.
+/// The middle one of at least four different values, if they occur four times in the mean. If it is that of more than a third of the presses, so
+/// that too few would be fitted, the nearest one to it with no more, which occurs four times at least. The ends are never chosen.
 fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
-    let count = values.len();
+    let all = values.clone();
     values.dedup_by(|a, b| same(*a, *b));
     // Values that scatter are no distinct settings.
-    (values.len() >= 4 && count >= 4 * values.len()).then(|| values[values.len() / 2])
+    if values.len() < SETTINGS_LEAST || all.len() < OFTEN * values.len() {
+        return None;
+    }
+    let count = |place: usize| all.iter().filter(|one| same(values[place], **one)).count();
+    let most = all.len() / HELDOUT_ONE_IN;
+    let middle = values.len() / 2;
+    if count(middle) <= most {
+        return Some(values[middle]);
+    }
+    let others = (1..values.len() - 1).filter(|place| (OFTEN..=most).contains(&count(*place)));
+    others.min_by_key(|place| place.abs_diff(middle)).map(|place| values[place])
 }
 
 fn same(one: f64, other: f64) -> bool {
@@ -290,3 +305,7 @@ fn path(frames: &Frames, begin: usize, end: usize) -> Result<Trajectory, Discove
     });
     Ok(Trajectory::new(points).map_err(Mismatch::Path)?)
 }
+
+#[cfg(test)]
+#[path = "bins_tests.rs"]
+mod tests;
