@@ -26,6 +26,7 @@
 //! | bins.rs | `HELDOUT_ONE_IN` | `3` | convention | a third judges, two thirds fit |
 //! | bins.rs | `SETTINGS_LEAST` | `4` | convention | a middle one of fewer has hardly any on either side |
 //! | bins.rs | `OFTEN` | `4` | convention | what occurs less often may be scatter |
+//! | bins.rs | `JUDGED_LEAST` | `3` | derived | `PRESSES_LEAST` of `verdict/structured.rs` |
 //! | contacts.rs | `SAME_DEPTH_MM` | `0.03` | convention | what differs by less is one setting |
 //! | contacts.rs | `SAME_PLACE_MM` | `0.05` | convention | the same, of places |
 //! | contacts.rs | `SAME_SPEED_RATIO` | `1.5` | convention | the same, of speeds |

@@ -25,6 +25,8 @@ const HELDOUT_ONE_IN: usize = 3;
 const SETTINGS_LEAST: usize = 4;
 /// A value that occurs so many times is a setting.
 const OFTEN: usize = 4;
+/// So many presses are held out, even where a run has no other press: fewer have no bound of what is structured in them.
+const JUDGED_LEAST: usize = 3;
 
 /// Bins in order of time, run by run.
 #[derive(Debug)]
@@ -170,37 +172,49 @@ impl Bins {
 
 impl HeldOut {
     /// Holds out one press in three with the rest that follows it. If the data have several coverings, or else several depths,
-    /// all presses of one of them are held out, if these are no more than a third.
+    /// all presses of one of them are held out, if these are no more than a third. Each run keeps a press and its zeros, as long as there are others
+    /// to hold out.
     pub(crate) fn choose(frames: &Frames, seed: u64) -> Self {
         let mut rng = Rng::new(seed);
         let presses = PressSpan::of(frames);
-        let mut out = vec![false; presses.len()];
         let mut order: Vec<usize> = (0..presses.len()).collect();
         rng.shuffle(&mut order);
         let wanted = presses.len() / HELDOUT_ONE_IN;
         let (mut depths_mm, mut coverings_mm) = (Vec::new(), Vec::new());
         // One in the middle: outside the fitted range even the true model may look wrong.
-        if let Some(covering_mm) = middle(presses.iter().map(|press| press.covering_mm)) {
+        if let Some(covering_mm) = middle(&presses, |press| press.covering_mm) {
             coverings_mm.push(covering_mm);
-        } else if let Some(depth_mm) = middle(presses.iter().map(|press| press.depth_mm)) {
+        } else if let Some(depth_mm) = middle(&presses, |press| press.depth_mm) {
             depths_mm.push(depth_mm);
         }
-        for (out, press) in out.iter_mut().zip(&presses) {
-            *out = coverings_mm.iter().any(|one| same(*one, press.covering_mm))
-                || depths_mm.iter().any(|one| same(*one, press.depth_mm));
+        let is_of = |press: &PressSpan| {
+            coverings_mm.iter().any(|one| same(*one, press.covering_mm))
+                || depths_mm.iter().any(|one| same(*one, press.depth_mm))
+        };
+        let mut out: Vec<bool> = presses.iter().map(is_of).collect();
+        let mut held = out.iter().filter(|out| **out).count();
+        let mut fitted = vec![0_usize; frames.runs.len()];
+        for (press, _) in presses.iter().zip(&out).filter(|(_, out)| !**out) {
+            fitted[press.run] += 1;
         }
-        for index in order {
-            if out.iter().filter(|out| **out).count() >= wanted {
-                break;
+        // Each run has a gain and zeros of its own, which a press of it has to show. Where that leaves hardly any press to judge by, some runs are
+        // judged without.
+        for (least, kept) in [(wanted, 1), (wanted.min(JUDGED_LEAST), 0)] {
+            for index in &order {
+                let of_run = &mut fitted[presses[*index].run];
+                if held < least && !out[*index] && *of_run > kept {
+                    out[*index] = true;
+                    *of_run -= 1;
+                    held += 1;
+                }
             }
-            out[index] = true;
         }
         let mut of_frame = vec![false; frames.len()];
         for (press, out) in presses.iter().zip(&out) {
             of_frame[press.first..press.end].fill(*out);
         }
         rests(frames, &presses, &mut rng, &mut of_frame);
-        let held = out.iter().filter(|out| **out).count();
+        zeros(frames, &mut of_frame);
         Self { frames: of_frame, train_presses: presses.len() - held, presses: held, depths_mm, coverings_mm }
     }
 }
@@ -212,6 +226,7 @@ pub(crate) fn presses(frames: &Frames) -> usize {
 
 /// Frames of a press and of the rest after it, up to the next press or [`STRETCH_S`].
 struct PressSpan {
+    run: usize,
     first: usize,
     end: usize,
     depth_mm: f64,
@@ -222,7 +237,7 @@ impl PressSpan {
     fn of(frames: &Frames) -> Vec<Self> {
         let mut presses: Vec<Self> = Vec::new();
         let mut begin = 0;
-        for (_, run_end) in &frames.runs {
+        for (run, (_, run_end)) in frames.runs.iter().enumerate() {
             let mut last: Option<i32> = None;
             let mut left_s = f64::NEG_INFINITY;
             for frame in begin..*run_end {
@@ -230,7 +245,8 @@ impl PressSpan {
                 if press >= 0 {
                     if last != Some(press) {
                         let covering_mm = frames.covering_mm[frame];
-                        presses.push(Self { first: frame, end: frame + 1, depth_mm: 0.0, covering_mm });
+                        let end = frame + 1;
+                        presses.push(Self { run, first: frame, end, depth_mm: 0.0, covering_mm });
                         last = Some(press);
                     }
                     left_s = frames.t_s[frame];
@@ -271,24 +287,47 @@ fn rests(frames: &Frames, presses: &[PressSpan], rng: &mut Rng, out: &mut [bool]
     }
 }
 
+/// Has the runs that would have no fitted frame in the clear, which shows their zeros, fitted wherever they have frames in the clear without a
+/// press.
+fn zeros(frames: &Frames, out: &mut [bool]) {
+    let mut begin = 0;
+    for (_, end) in &frames.runs {
+        let is_clear = |frame: &usize| frames.position_mm[*frame][2] > CLEAR_MM;
+        if !(begin..*end).any(|frame| is_clear(&frame) && !out[frame]) {
+            for frame in (begin..*end).filter(|frame| is_clear(frame) && frames.press[*frame] < 0) {
+                out[frame] = false;
+            }
+        }
+        begin = *end;
+    }
+}
+
 /// The middle one of at least four different values, if they occur four times in the mean. If it is that of more than a third of the presses, so
-/// that too few would be fitted, the nearest one to it with no more, which occurs four times at least. The ends are never chosen.
-fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
+/// that too few would be fitted, or of all presses of a run, the nearest one to it of which neither is true, and which occurs four times at least.
+/// The ends are never chosen.
+fn middle(presses: &[PressSpan], value: impl Fn(&PressSpan) -> f64) -> Option<f64> {
+    let mut values: Vec<f64> = presses.iter().map(&value).collect();
     values.sort_by(f64::total_cmp);
-    let all = values.clone();
     values.dedup_by(|a, b| same(*a, *b));
     // Values that scatter are no distinct settings.
-    if values.len() < SETTINGS_LEAST || all.len() < OFTEN * values.len() {
+    if values.len() < SETTINGS_LEAST || presses.len() < OFTEN * values.len() {
         return None;
     }
-    let count = |place: usize| all.iter().filter(|one| same(values[place], **one)).count();
-    let most = all.len() / HELDOUT_ONE_IN;
+    let has = |place: usize| {
+        let (values, value) = (&values, &value);
+        move |press: &&PressSpan| same(values[place], value(press))
+    };
+    let count = |place: usize| presses.iter().filter(has(place)).count();
+    let leaves_enough = |place: &usize| {
+        let mut of_runs = presses.chunk_by(|one, next| one.run == next.run);
+        count(*place) <= presses.len() / HELDOUT_ONE_IN
+            && of_runs.all(|of_run| !of_run.iter().all(|press| has(*place)(&press)))
+    };
     let middle = values.len() / 2;
-    if count(middle) <= most {
+    if leaves_enough(&middle) {
         return Some(values[middle]);
     }
-    let others = (1..values.len() - 1).filter(|place| (OFTEN..=most).contains(&count(*place)));
+    let others = (1..values.len() - 1).filter(|place| leaves_enough(place) && count(*place) >= OFTEN);
     others.min_by_key(|place| place.abs_diff(middle)).map(|place| values[place])
 }
 
