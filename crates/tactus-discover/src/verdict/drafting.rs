@@ -200,15 +200,21 @@ const STRENGTH_APART: f64 = 0.3;
 const STRENGTH_SE: f64 = 3.0;
 
 impl Confirmation {
-    /// Whether the draft holds; `None` if it may close enough or not, by twice the standard error of what it closes.
+    /// Whether the draft holds. It does not if its strength differs from 1, or if it closes too little. `None` if these data do not tell: what it
+    /// closes may be enough or not, by twice its standard error; nothing is left that a draft may close; or its strength is so uncertain that one
+    /// of 0, which is no draft, would pass for 1.
     pub fn holds(&self) -> Option<bool> {
         let apart = (self.strength - 1.0).abs();
-        let is_as_strong =
-            apart <= STRENGTH_APART || self.strength_se.is_some_and(|error| apart <= STRENGTH_SE * error);
-        let Some(Closed { share, standard_error, .. }) = self.closed.filter(|_| is_as_strong) else {
+        let error = self.strength_se?;
+        if apart > STRENGTH_APART && apart > STRENGTH_SE * error {
             return Some(false);
-        };
-        let may_be = share + MOST_ERRORS * standard_error.unwrap_or(0.0);
+        }
+        // No draft is apart by 1.
+        if STRENGTH_SE * error >= 1.0 {
+            return None;
+        }
+        let Closed { share, standard_error, .. } = self.closed?;
+        let may_be = share + MOST_ERRORS * standard_error.unwrap_or(f64::INFINITY);
         (share >= CONFIRMED_LEAST || may_be < CONFIRMED_LEAST).then_some(share >= CONFIRMED_LEAST)
     }
 }

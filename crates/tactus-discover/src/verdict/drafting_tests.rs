@@ -306,20 +306,58 @@ fn new_data_confirm_a_draft_that_holds_and_refute_one_that_does_not() {
     assert!(none.holds() == Some(false) && none.strength.abs() < 0.1, "{none:?}");
 }
 
-#[test]
-fn what_may_close_enough_or_not_is_no_answer() {
-    let told = |share: f64, error: f64, strength: f64| Confirmation {
+/// What new data tell of a draft: what it closes, with its standard error, and its strength.
+fn told(share: f64, error: f64, strength: f64) -> Confirmation {
+    Confirmation {
         strength,
         strength_se: Some(0.05),
         closed: Some(Closed { share, standard_error: Some(error), most: 1.0 }),
         heldout_rms_before_counts: 2.0,
         heldout_rms_after_counts: 1.0,
-    };
+    }
+}
+
+#[test]
+fn what_may_close_enough_or_not_is_no_answer() {
     assert_eq!(told(0.81, 0.2, 1.0).holds(), Some(true));
     assert_eq!(told(0.75, 0.12, 1.0).holds(), None);
     assert_eq!(told(0.75, 0.02, 1.0).holds(), Some(false));
     assert_eq!(told(0.75, 0.12, 0.5).holds(), Some(false), "it is half as strong");
-    assert_eq!(Confirmation { closed: None, ..told(0.9, 0.01, 1.0) }.holds(), Some(false), "nothing is left");
+}
+
+#[test]
+fn data_that_cannot_tell_a_draft_do_not_refute_it() {
+    let nothing_left = |strength| Confirmation { closed: None, ..told(0.9, 0.01, strength) };
+    assert_eq!(nothing_left(1.0).holds(), None);
+    assert_eq!(nothing_left(0.0).holds(), Some(false), "it is not there");
+    // Where it does not act its strength stays where it began, and it closes nothing.
+    let unknown = Confirmation { strength_se: None, ..told(0.0, 0.01, 1.0) };
+    assert_eq!(unknown.holds(), None);
+    let error =
+        |strength_se, strength| Confirmation { strength_se: Some(strength_se), ..told(0.1, 0.05, strength) };
+    assert_eq!(error(0.32, 0.9).holds(), Some(false), "what it closes tells");
+    assert_eq!(error(0.34, 0.9).holds(), None, "no draft would pass too");
+    assert_eq!(error(0.34, 0.0).holds(), None);
+    assert_eq!(error(0.5, 3.0).holds(), Some(false), "it differs from 1, however uncertain it is");
+    let of_two = Confirmation {
+        closed: Some(Closed { share: 0.2, standard_error: None, most: 1.0 }),
+        ..told(0.2, 0.1, 1.0)
+    };
+    assert_eq!(of_two.holds(), None, "two presses tell no error of what is closed");
+}
+
+/// It is of pressed elements, and nothing is pressed deep enough to show it.
+#[test]
+fn presses_in_which_a_draft_hardly_acts_do_not_refute_it() {
+    let (known, _, found) = &*SAGGING;
+    let definition = drafted(found).draft.clone().define().unwrap();
+    let lightly = |within: usize| match within {
+        5..25 => (if within < 10 { Phase::Load } else { Phase::Hold }, 0.01),
+        _ => (Phase::Idle, -2.0),
+    };
+    let light = measured_along(lightly, known, &[], &noise(12));
+    let told = confirm(known, &light, definition, 1).unwrap();
+    assert_eq!(told.holds(), None, "{told:?}");
 }
 
 /// `heavy-tail` is tried first and follows a part of it.
