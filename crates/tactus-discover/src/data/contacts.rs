@@ -1,5 +1,8 @@
 //! The contacts in the data, and how they differ.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use tactus_model::Phase;
 
 use super::frames::Frames;
@@ -22,7 +25,11 @@ pub(crate) struct Contacts<'a> {
     /// First frame, and the one after the last.
     spans: Vec<[usize; 2]>,
     still: Vec<usize>,
+    places: usize,
 }
+
+/// Where a contact's tip came from: in the positive direction of x, and of y.
+type Sides = [bool; 2];
 
 impl<'a> Contacts<'a> {
     pub(crate) fn of(frames: &'a Frames) -> Self {
@@ -41,7 +48,9 @@ impl<'a> Contacts<'a> {
             }
             press = press.max(frames.press[frame]);
         }
-        Self { frames, spans, still: still(frames) }
+        let place = |[first, _]: &[usize; 2]| [0, 1].map(|axis| frames.position_mm[*first][axis]);
+        let places = distinct_places(spans.iter().map(place));
+        Self { frames, spans, still: still(frames), places }
     }
 
     pub(crate) fn count(&self) -> usize {
@@ -64,8 +73,8 @@ impl<'a> Contacts<'a> {
         distinct(&depths_mm, |a, b| b - a > SAME_DEPTH_MM)
     }
 
-    pub(crate) fn distinct_places(&self) -> usize {
-        tactus_calibrate::distinct_places(self.places_mm()).len()
+    pub(crate) const fn distinct_places(&self) -> usize {
+        self.places
     }
 
     pub(crate) fn longest_hold_s(&self) -> f64 {
@@ -109,10 +118,25 @@ impl<'a> Contacts<'a> {
 
     /// True if one place was reached from different sides.
     pub(crate) fn approaches(&self) -> bool {
-        let from: Vec<([f64; 2], [bool; 2])> =
-            self.spans.iter().filter_map(|[first, _]| self.from(*first)).collect();
-        from.iter()
-            .any(|(place, sides)| from.iter().any(|(other, others)| !far(*place, *other) && sides != others))
+        let mut cells: BTreeMap<Cell, BTreeMap<Sides, BTreeSet<[u64; 2]>>> = BTreeMap::new();
+        for (place, sides) in self.spans.iter().filter_map(|[first, _]| self.from(*first)) {
+            cells.entry(cell(place)).or_default().entry(sides).or_default().insert(place.map(f64::to_bits));
+        }
+        let places = |of: &BTreeSet<[u64; 2]>| -> Vec<[f64; 2]> {
+            of.iter().map(|place| place.map(f64::from_bits)).collect()
+        };
+        let meet = |some: &[[f64; 2]], others: &[[f64; 2]]| {
+            some.iter().any(|place| others.iter().any(|other| !far(*place, *other)))
+        };
+        cells.iter().any(|(at, of_sides)| {
+            around(*at).filter_map(|near| cells.get(&near)).any(|of_others| {
+                of_sides.iter().any(|(sides, some)| {
+                    let different = of_others.iter().filter(|(others, _)| *others != sides);
+                    let some = places(some);
+                    different.into_iter().any(|(_, others)| meet(&some, &places(others)))
+                })
+            })
+        })
     }
 
     /// True if a place was pressed more than once.
@@ -133,13 +157,6 @@ impl<'a> Contacts<'a> {
         -self.frames.position_mm[frame][2]
     }
 
-    fn places_mm(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
-        self.spans.iter().map(|[first, _]| {
-            let [x, y, _] = self.frames.position_mm[*first];
-            [x, y]
-        })
-    }
-
     /// Loading speeds of a contact, frame by frame, in ascending order.
     fn speeds(&self, first: usize, end: usize) -> Vec<f64> {
         let speed = |frame: usize| {
@@ -154,7 +171,7 @@ impl<'a> Contacts<'a> {
     }
 
     /// A contact's place, and whether it was last approached in the positive direction of x and of y.
-    fn from(&self, first: usize) -> Option<([f64; 2], [bool; 2])> {
+    fn from(&self, first: usize) -> Option<([f64; 2], Sides)> {
         let [x, y, _] = self.frames.position_mm[first];
         let before = (0..first).rev().take(600).map(|frame| self.frames.position_mm[frame]);
         let [from_x, from_y, _] = before.into_iter().find(|at| far([at[0], at[1]], [x, y]))?;
@@ -164,6 +181,34 @@ impl<'a> Contacts<'a> {
 
 fn far([x, y]: [f64; 2], [other_x, other_y]: [f64; 2]) -> bool {
     (x - other_x).hypot(y - other_y) > SAME_PLACE_MM
+}
+
+/// A square of the plane whose places are not far from each other.
+type Cell = [i64; 2];
+
+fn cell(place_mm: [f64; 2]) -> Cell {
+    #[expect(clippy::cast_possible_truncation, reason = "a length over a small one")]
+    let number = |at_mm: f64| (at_mm / (FRAC_1_SQRT_2 * SAME_PLACE_MM)).floor() as i64;
+    place_mm.map(number)
+}
+
+/// The cells in which places may be that are not far from those of a cell.
+fn around([x, y]: Cell) -> impl Iterator<Item = Cell> {
+    (-2..=2).flat_map(move |right| (-2..=2).map(move |up| [x.saturating_add(right), y.saturating_add(up)]))
+}
+
+/// Number of places of which each was far from all counted before it.
+fn distinct_places(places_mm: impl Iterator<Item = [f64; 2]>) -> usize {
+    let mut cells: BTreeMap<Cell, Vec<[f64; 2]>> = BTreeMap::new();
+    let mut count = 0;
+    for place in places_mm {
+        let mut near = around(cell(place)).filter_map(|near| cells.get(&near)).flatten();
+        if near.all(|other| far(place, *other)) {
+            cells.entry(cell(place)).or_default().push(place);
+            count += 1;
+        }
+    }
+    count
 }
 
 /// Number of distinct values in a sorted list.

@@ -53,12 +53,9 @@ pub(super) fn closed(
     let squares: Vec<Sums> = presses.iter().map(|of| of[2]).filter(|[_, count]| *count > 0.0).collect();
     let (left, error) = jackknife(&squares)?;
     let certain = left - student_95(squares.len()) * after.with_noise(left, error);
-    let share = |of: &[OfPress], least_left: f64| -> Option<f64> {
-        let mean = |which: usize| -> f64 {
-            let [sum, count] = of.iter().fold([0.0; 2], |sums, of| [0, 1].map(|k| sums[k] + of[which][k]));
-            if count > 0.0 { sum / count } else { 0.0 }
-        };
-        let (explained, left) = (mean(0), (mean(1).max(least_left) - of_estimates).max(0.0));
+    let share = |of: &OfPress, least_left: f64| -> Option<f64> {
+        let mean = |[sum, count]: Sums| if count > 0.0 { sum / count } else { 0.0 };
+        let (explained, left) = (mean(of[0]), (mean(of[1]).max(least_left) - of_estimates).max(0.0));
         let all = explained + left;
         (all > 0.0).then(|| explained / all)
     };
@@ -68,15 +65,18 @@ pub(super) fn closed(
     Some(Closed { share: whole, standard_error, most })
 }
 
-/// A share of all presses, and its standard error.
-fn with_error(presses: &[OfPress], share: impl Fn(&[OfPress]) -> Option<f64>) -> Option<(f64, Option<f64>)> {
-    let whole = share(presses)?;
-    let without = |press: usize| {
-        let mut others = presses.to_vec();
-        others.remove(press);
-        share(&others)
-    };
-    let parts: Option<Vec<f64>> = (0..presses.len()).map(without).collect();
+/// A share of the sums over all presses, and its standard error.
+fn with_error(presses: &[OfPress], share: impl Fn(&OfPress) -> Option<f64>) -> Option<(f64, Option<f64>)> {
+    let mut total = OfPress::default();
+    for of in presses {
+        for (sums, of) in total.iter_mut().zip(of) {
+            sums.iter_mut().zip(of).for_each(|(sum, of)| *sum += of);
+        }
+    }
+    let whole = share(&total)?;
+    let without =
+        |press: &OfPress| share(&[0, 1, 2].map(|which| [0, 1].map(|k| total[which][k] - press[which][k])));
+    let parts: Option<Vec<f64>> = presses.iter().map(without).collect();
     let standard_error = parts.filter(|parts| parts.len() >= 3).map(|parts| {
         let count = parts.len() as f64;
         let mean = parts.iter().sum::<f64>() / count;

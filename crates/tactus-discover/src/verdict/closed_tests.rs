@@ -84,3 +84,39 @@ fn the_most_that_a_model_may_close_is_less_than_it_leaves_room_for() {
         assert!(most < closes + 5.0 * error && most > closes, "{closes}: {most}");
     }
 }
+
+/// The error by its definition: the share of all presses but one, for each in turn.
+#[test]
+fn the_error_is_that_of_the_shares_without_each_press() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut draw = || f64::from(rng.random_range(1..1000_u32)) / 1000.0;
+    let presses: Vec<OfPress> =
+        (0..40).map(|_| [[draw(), 600.0], [0.3 * draw(), 500.0], [draw(), 600.0]]).collect();
+    let share = |of: &OfPress| {
+        let [explained, left, _] = of.map(|[sum, count]| sum / count);
+        Some(explained / (explained + left))
+    };
+    let of_all = |presses: &[OfPress]| {
+        let mut sums = OfPress::default();
+        for (which, k) in (0..3).flat_map(|which| [(which, 0), (which, 1)]) {
+            sums[which][k] = presses.iter().map(|press| press[which][k]).sum();
+        }
+        share(&sums).unwrap()
+    };
+    let without = |press: usize| of_all(&[&presses[..press], &presses[press + 1..]].concat());
+    let parts: Vec<f64> = (0..presses.len()).map(without).collect();
+    let mean = parts.iter().sum::<f64>() / 40.0;
+    let want = (parts.iter().map(|one| (one - mean).powi(2)).sum::<f64>() * 39.0 / 40.0).sqrt();
+    let (whole, error) = with_error(&presses, share).unwrap();
+    assert!((whole - of_all(&presses)).abs() < 1e-12);
+    assert!((error.unwrap() / want - 1.0).abs() < 1e-10, "{error:?} {want}");
+}
+
+/// As many as there are frames in a recording of presses of one frame each.
+#[test]
+fn the_error_of_many_presses_takes_no_time() {
+    let presses: Vec<OfPress> =
+        (0..300_000).map(|press| [[f64::from(press % 7), 48.0], [1.0, 48.0], [1.0, 48.0]]).collect();
+    let (_, error) = with_error(&presses, |of| Some(of[0][0] / (of[0][0] + of[1][0]))).unwrap();
+    assert!(error.is_some_and(|error| error > 0.0 && error < 1e-2), "{error:?}");
+}
