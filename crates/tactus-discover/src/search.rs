@@ -39,6 +39,7 @@
 //! | covariates.rs | `CENTRED_MM` | `0.02` | convention | places that differ by less are one |
 //! | draft.rs | `WEIGHED_MAX` | `12` | cost | of a second pass |
 //! | draft.rs | `COLUMNS_MAX` | `512` | cost | the memory of a pass; 200 at first |
+//! | draft.rs | `PARTS_MAX` | `2 * COLUMNS_MAX * 48 * BLOCKS_MAX` | cost | 160 MB, which the paper's sensor never takes (decision 0062) |
 //! | draft.rs | `TRIED_MAX` | `3` | cost | of fits |
 //! | draft.rs | `KNOTS` | `7` | cost | straight lines over six parts of the range |
 //! | draft.rs | `KNOTS_OF_SECOND` | `4` | cost | a table of 7 x 4 values, of 14 x 8 at most |

@@ -31,7 +31,7 @@ const CHUNK_COLUMNS: usize = 32_768;
 /// Bins of which products are computed together: those of some hundred directions stay near the processor.
 const TILE_BINS: usize = 4;
 /// Greatest number of blocks whose signs are flipped apart; more are joined.
-const BLOCKS_MAX: usize = 400;
+pub(crate) const BLOCKS_MAX: usize = 400;
 /// Step of the derivative by the gains.
 const GAIN_SHARE: f64 = 1e-3;
 

@@ -25,12 +25,13 @@ use tactus_model::effect::{Draft, PipelineStage};
 
 use self::form::AsEffect;
 use self::grammar::Atom;
-use self::sight::Sight;
+use self::sight::{KNOTS_OF_ELEMENTS, Sight};
 use super::evidence::{Addition, Evidence, Gain, Signs};
 use super::grow::{FLIPS, Search};
+use super::not_shown::NotShown;
 use super::score::{Score, flipped, largest, p_value};
 use crate::data::DiscoverError;
-use crate::fit::{FOLDS, Fitted, Free, Grams, Term};
+use crate::fit::{BLOCKS_MAX, FOLDS, Fitted, Free, Grams, Term};
 use crate::numbers::parallel;
 use crate::progress::Stage;
 
@@ -38,6 +39,9 @@ use crate::progress::Stage;
 const WEIGHED_MAX: usize = 12;
 /// Greatest number of columns of a pass: the parts of blocks take memory.
 const COLUMNS_MAX: usize = 512;
+/// Greatest number of columns times blocks times elements of a pass, which takes 8 bytes for each. Of the paper's sensor that is more than all atoms
+/// have that are weighed.
+const PARTS_MAX: usize = 2 * COLUMNS_MAX * 48 * BLOCKS_MAX;
 /// Drafts that are tried as effects, the best first.
 const TRIED_MAX: usize = 3;
 /// Knots of the curve of a covariate, and of a second one beside it.
@@ -226,7 +230,7 @@ impl Search<'_> {
     ) -> Result<Outcome, DiscoverError> {
         let sight = Arc::new(Sight::of(self.problem, at)?);
         self.reporter.enter(Stage::Drafting, "drafting what nobody has named");
-        let atoms = grammar::atoms(self.problem, at, &sight, self.rounds);
+        let atoms = self.atoms(at, &sight);
         let (p_value, first) = self.screened(at, &sight, &atoms)?;
         if p_value > alpha {
             return Ok(Err(NoDraft::Noise));
@@ -257,6 +261,13 @@ impl Search<'_> {
             field.leave_out(atom);
         }
         Ok(Err(why))
+    }
+
+    /// The atoms of the grammar, without those of single elements that take too much memory.
+    fn atoms(&self, at: &Fitted, sight: &Sight) -> Vec<Atom> {
+        let mut atoms = grammar::atoms(self.problem, at, sight, self.rounds);
+        atoms.retain(|atom| !atom.of_elements || atom.columns(sight.elements) <= self.columns_most());
+        atoms
     }
 
     /// The best atom of a field. Of those that are as good as the first the one is best that is so with as many knots as the evidence carries, and of
@@ -302,7 +313,7 @@ impl Search<'_> {
             let mut columns = 0;
             let fits = |atom: &&Atom| {
                 columns += atom.columns(sight.elements);
-                columns <= COLUMNS_MAX
+                columns <= self.columns_most()
             };
             let some = atoms[first..].iter().take_while(fits).count().max(1);
             let (weighed, grams) = self.products(at, sight, atoms[first..first + some].to_vec())?;
@@ -384,7 +395,8 @@ impl Search<'_> {
             let mut directions = Vec::new();
             let mut of_atoms: Vec<(&Atom, Range<usize>)> = Vec::new();
             for atom in rest {
-                if !directions.is_empty() && directions.len() + atom.columns(sight.elements) > COLUMNS_MAX {
+                let count = directions.len() + atom.columns(sight.elements);
+                if !directions.is_empty() && count > self.columns_most() {
                     break;
                 }
                 let first = directions.len();
@@ -416,12 +428,45 @@ impl Search<'_> {
         let mut order: Vec<usize> = (0..atoms.len()).filter(|atom| !scores[*atom].is_empty()).collect();
         order.sort_by(|a, b| strength(&scores[*b]).total_cmp(&strength(&scores[*a])));
         order.truncate(WEIGHED_MAX);
+        let mut columns = 0;
+        order.retain(|place| {
+            // Once it has a curve, an atom of single elements has a column for each.
+            let of_elements = atoms[*place].of_elements;
+            let own = if of_elements { sight.elements } else { atoms[*place].columns(sight.elements) };
+            let fits = columns == 0 || columns + own <= self.parts_most();
+            columns += if fits { own } else { 0 };
+            fits
+        });
         let first = order.into_iter().map(|place| {
             let Screened { atom, own, grams } = &screened[place];
             let atom = (*atom).clone();
             if atom.of_elements { sight.with_curve(atom, grams, own.clone()) } else { atom }
         });
         Ok((p_value(statistic, &under_none), first.collect()))
+    }
+
+    /// Columns of a pass for which there is memory.
+    fn parts_most(&self) -> usize {
+        let bins = self.problem.predictor.bins;
+        PARTS_MAX / (bins.blocks.clamp(1, BLOCKS_MAX) * bins.elements)
+    }
+
+    /// Greatest number of columns of a pass that tests each by itself.
+    fn columns_most(&self) -> usize {
+        self.parts_most().min(COLUMNS_MAX)
+    }
+
+    /// The drafts that are not tried, because the array has too many elements.
+    pub(crate) fn drafts_not_tried(&self) -> Option<NotShown> {
+        let elements = self.problem.predictor.bins.elements;
+        let (columns, most) = (KNOTS_OF_ELEMENTS * elements, self.columns_most());
+        (columns > most).then(|| NotShown {
+            effect: "a draft of single elements",
+            reason: format!(
+                "each of the {elements} elements would have {KNOTS_OF_ELEMENTS} values of its own; a pass over these data has memory for \
+                 {most} values"
+            ),
+        })
     }
 
     /// The products of atoms.

@@ -110,6 +110,9 @@ pub(crate) fn conclude(
         lacks_repeats: verdict == Verdict::CannotJudge,
     })?;
 
+    // No experiment would show them.
+    not_shown.extend(search.drafts_not_tried().filter(|_| options.rule == Rule::Protocol));
+
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
     let is_added = !names.is_empty() || prepared.converter.is_some();
     let share = share_unexplained(verdict, is_added, search.share_left(base, &grown));

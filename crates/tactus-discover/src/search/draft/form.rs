@@ -14,7 +14,7 @@ use tactus_model::effect::{Carrier, Draft};
 use super::curves::Curve;
 use super::grammar::Atom;
 use super::sight::Sight;
-use super::{COLUMNS_MAX, KNOTS, KNOTS_OF_SECOND, additions, as_good_as_first, curves, grammar, words};
+use super::{KNOTS, KNOTS_OF_SECOND, additions, as_good_as_first, curves, grammar, words};
 use crate::data::DiscoverError;
 use crate::fit::{FOLDS, Fitted, Grams, Term};
 use crate::search::evidence::Addition;
@@ -128,7 +128,7 @@ impl Search<'_> {
     ) -> Result<Gained<Atom>, DiscoverError> {
         let seconds: Vec<Atom> = grammar::with_seconds(coarse, sight).collect();
         let each = seconds.iter().map(|second| second.columns(sight.elements)).max().unwrap_or(1);
-        let room = COLUMNS_MAX.saturating_sub(fine.columns(sight.elements));
+        let room = self.columns_most().saturating_sub(fine.columns(sight.elements));
         let mut best: Gained<Atom> = None;
         for some in seconds.chunks((room / each).max(1)) {
             let atoms = std::iter::once(fine).chain(some).cloned().collect();
@@ -155,7 +155,8 @@ impl Search<'_> {
         atom: &Atom,
     ) -> Result<Gained<Arc<Vec<f64>>>, DiscoverError> {
         let may_have = matches!(atom.carrier, Carrier::Counts | Carrier::OwnSignal | Carrier::EveryElement);
-        if !may_have || atom.weights.is_some() {
+        let is_too_many = sight.elements + atom.columns(sight.elements) > self.columns_most();
+        if !may_have || atom.weights.is_some() || is_too_many {
             return Ok(None);
         }
         let Some(shared) = self.curve(at, sight, atom)?.shared() else { return Ok(None) };
