@@ -147,6 +147,7 @@ impl Bins {
     /// Sets the bins' weights from the noise, and divides them into blocks.
     pub(crate) fn weigh(&mut self, frames: &Frames, noise: &Noise, heldout: &HeldOut) {
         let interval_s = interval_s(frames);
+        let turns = turns(frames);
         let block_s = BLOCK_S.max(10.0 * noise.memory_frames() as f64 * interval_s);
         let mut block = 0;
         let mut began = 0;
@@ -155,7 +156,7 @@ impl Bins {
             self.heldout[bin] = heldout.frames[frame];
             let count = self.frames_in(bin);
             let whole = count as f64 / noise.inflation(count);
-            self.weight[bin] = if turns(frames, frame) { 0.0 } else { whole };
+            self.weight[bin] = if turns[frame] { 0.0 } else { whole };
             let other = self.run[bin] != self.run[began]
                 || frames.press[frame] != frames.press[start]
                 || heldout.frames[frame] != heldout.frames[start]

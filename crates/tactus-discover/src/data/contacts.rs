@@ -6,12 +6,14 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use tactus_model::Phase;
 
 use super::frames::Frames;
-use super::motion::{pressing, still};
+use super::motion::{pressing, still, still_mm};
 
 /// Depths, places and speeds that differ by less count as the same.
 const SAME_DEPTH_MM: f64 = 0.03;
 const SAME_PLACE_MM: f64 = 0.05;
 const SAME_SPEED_RATIO: f64 = 1.5;
+/// The tip rises if it does by more from frame to frame.
+const RISES_MM: f64 = 0.005;
 /// The speed of a load varies if it has so many frames and its quartiles differ by more than this factor: then they are no frames in
 /// which a move at one speed starts or stops.
 const FRAMES_MANY: usize = 20;
@@ -97,8 +99,9 @@ impl<'a> Contacts<'a> {
 
     /// True if the tip rises within a contact.
     pub(crate) fn falls_in_contact(&self) -> bool {
+        let least_mm = RISES_MM.max(still_mm(self.frames));
         self.spans.iter().any(|[first, end]| {
-            (first + 1..*end).any(|frame| self.depth_mm(frame) < self.depth_mm(frame - 1) - 0.005)
+            (first + 1..*end).any(|frame| self.depth_mm(frame) < self.depth_mm(frame - 1) - least_mm)
         })
     }
 

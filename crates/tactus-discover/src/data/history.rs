@@ -2,6 +2,7 @@
 
 use super::bins::Bins;
 use super::frames::{Frames, OnWay};
+use super::motion::still_mm;
 
 /// A sideways move shorter than this has no direction.
 const ASIDE_MM: f64 = 0.05;
@@ -48,13 +49,15 @@ impl History {
             last_place_mm: Vec::with_capacity(count),
             temperature_c: empty(),
         };
-        let mut state = SensorHistory::default();
+        let still_mm = still_mm(frames);
+        let start = || SensorHistory { still_mm, ..SensorHistory::default() };
+        let mut state = start();
         let mut next = 0;
         let mut run = usize::MAX;
         for bin in 0..count {
             if bins.run[bin] != run {
                 run = bins.run[bin];
-                state = SensorHistory::default();
+                state = start();
             }
             for moment in frames.on_way(next..bins.first[bin + 1]) {
                 state.take(moment);
@@ -86,6 +89,8 @@ impl History {
 /// History of the sensor up to a frame.
 #[derive(Debug, Default)]
 struct SensorHistory {
+    /// A movement that is no greater counts as none.
+    still_mm: f64,
     last: Option<(f64, [f64; 3])>,
     depth_mm: f64,
     contact_s: f64,
@@ -111,7 +116,7 @@ impl SensorHistory {
         if let Some((last_s, last)) = self.last {
             let dt_s = (t_s - last_s).max(1e-6);
             let fell_mm = last[2] - at[2];
-            if fell_mm.abs() > 1e-3 {
+            if fell_mm.abs() > self.still_mm {
                 self.upward = fell_mm < 0.0;
                 if depth_mm > 0.0 {
                     self.speed_mm_per_s = fell_mm.abs() / dt_s;
@@ -121,14 +126,14 @@ impl SensorHistory {
             let far = aside[0].hypot(aside[1]);
             let moved_mm = far.max(fell_mm.abs());
             self.travel_mm_per_s = moved_mm / dt_s;
-            if self.moves != (moved_mm > 1e-3) {
+            if self.moves != (moved_mm > self.still_mm) {
                 (self.moves, self.turn_s) = (!self.moves, t_s);
             }
             if far > ASIDE_MM {
                 self.heading = aside.map(|moved| moved / far);
             }
             for (held, moved) in self.aside.iter_mut().zip(aside) {
-                if moved.abs() > ASIDE_MM.min(far) && moved.abs() > 1e-3 {
+                if moved.abs() > ASIDE_MM.min(far) && moved.abs() > self.still_mm {
                     *held = moved.signum();
                 }
             }

@@ -1,17 +1,59 @@
 //! How the tip moves: where it rests, turns, presses or is clear of the surface.
 
+use std::f64::consts::SQRT_2;
+
 use tactus_model::Phase;
 
 use super::frames::Frames;
-use crate::numbers::median;
+use crate::numbers::{NORMAL_PER_MEDIAN, median};
 
-/// A smaller movement counts as none.
-pub(crate) const STILL_MM: f64 = 0.001;
+/// A smaller movement counts as none, unless positions jitter by more.
+const STILL_MM: f64 = 0.001;
+/// A jitter of positions is told from rests in which no step from frame to frame is longer.
+const JITTER_MOST_MM: f64 = 0.02;
+/// Fewer second differences of positions do not tell a jitter.
+const JITTER_LEAST: usize = 20;
+/// Two positions of a tip at rest differ by no more standard deviations: by chance, one pair in `5e8`.
+const JITTER_Z: f64 = 6.0;
 /// Above this height, movements of the tip do not affect the readings.
 pub(crate) const CLEAR_MM: f64 = 0.25;
 /// Near the surface, a frame at which the speed of the stage changes by more is ignored: the stage does not start or stop at
 /// once, and between two of its reports the position of the tip is not known.
 const TURN_MM_PER_S: f64 = 1.2;
+
+/// A movement that is no greater counts as none: [`STILL_MM`], or what a jitter of the positions makes of a tip at rest.
+pub(crate) fn still_mm(frames: &Frames) -> f64 {
+    let jitter_mm = jitter_mm(frames, |frame| frames.phase[frame] == Phase::Hold);
+    let jitter_mm = jitter_mm.or_else(|| self::jitter_mm(frames, |_| true)).unwrap_or(0.0);
+    STILL_MM.max(JITTER_Z * SQRT_2 * jitter_mm)
+}
+
+/// Standard deviation of the positions of a tip at rest, along the axis that jitters most: from the median second difference among frames, which
+/// moves at one speed do not change. `None` of too few.
+fn jitter_mm(frames: &Frames, is_among: impl Fn(usize) -> bool) -> Option<f64> {
+    let mut bends: [Vec<f64>; 3] = Default::default();
+    for last in 2..frames.len() {
+        let three = [last - 2, last - 1, last];
+        let is_next = |pair: &[usize]| {
+            frames.t_s[pair[0]] < frames.t_s[pair[1]]
+                && frames.press[pair[0]] == frames.press[pair[1]]
+                && !frames.is_after_gap(pair[1])
+        };
+        if !(three.into_iter().all(&is_among) && three.windows(2).all(is_next)) {
+            continue;
+        }
+        let [a, b, c] = three.map(|frame| frames.position_mm[frame]);
+        if (0..3).all(|axis| (b[axis] - a[axis]).abs().max((c[axis] - b[axis]).abs()) <= JITTER_MOST_MM) {
+            bends
+                .iter_mut()
+                .enumerate()
+                .for_each(|(axis, of)| of.push((a[axis] - 2.0 * b[axis] + c[axis]).abs()));
+        }
+    }
+    // `a - 2 b + c` has six times the variance.
+    let deviation = |bends: &Vec<f64>| NORMAL_PER_MEDIAN * median(bends) / 6.0_f64.sqrt();
+    (bends[0].len() >= JITTER_LEAST).then(|| bends.iter().map(deviation).fold(0.0, f64::max))
+}
 
 /// For every frame, the number of frames directly before it in which the tip was at the same place.
 pub(crate) fn still(frames: &Frames) -> Vec<usize> {
@@ -20,6 +62,7 @@ pub(crate) fn still(frames: &Frames) -> Vec<usize> {
 
 /// As [`still`], but ignores moves above a height.
 pub(crate) fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
+    let still_mm = still_mm(frames);
     let mut still = vec![0; frames.len()];
     let mut begin = 0;
     for (_, end) in &frames.runs {
@@ -27,7 +70,7 @@ pub(crate) fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
         let mut anchor = start;
         for (frame, still) in still.iter_mut().enumerate().take(*end).skip(start) {
             let moved = (0..3).any(|axis| {
-                (frames.position_mm[frame][axis] - frames.position_mm[anchor][axis]).abs() > STILL_MM
+                (frames.position_mm[frame][axis] - frames.position_mm[anchor][axis]).abs() > still_mm
             });
             let clear = [frame, anchor].iter().all(|one| frames.position_mm[*one][2] > clear_mm);
             let is_other = frames.press[frame] != frames.press[anchor] || frames.is_after_gap(frame);
@@ -41,15 +84,23 @@ pub(crate) fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
     still
 }
 
-/// True if the stage starts or stops at a frame, near the surface or in contact.
-pub(crate) fn turns(frames: &Frames, frame: usize) -> bool {
-    let Some(before) = frame.checked_sub(1).filter(|_| frame + 1 < frames.len()) else { return false };
-    let z_mm = |frame: usize| frames.position_mm[frame][2];
-    let speed = |from: usize| (z_mm(from + 1) - z_mm(from)) / (frames.t_s[from + 1] - frames.t_s[from]);
-    // Time starts anew with each run.
-    let is_one_run = frames.t_s[before] < frames.t_s[frame] && frames.t_s[frame] < frames.t_s[frame + 1];
-    let least_mm = z_mm(before).min(z_mm(frame)).min(z_mm(frame + 1));
-    is_one_run && least_mm < CLEAR_MM && (speed(frame) - speed(before)).abs() > TURN_MM_PER_S
+/// For every frame, whether the stage starts or stops at it, near the surface or in contact.
+pub(crate) fn turns(frames: &Frames) -> Vec<bool> {
+    let still_mm = still_mm(frames);
+    // A jitter makes a second difference of so much at most.
+    let jitter_mm = if still_mm > STILL_MM { 3.0_f64.sqrt() * still_mm } else { 0.0 };
+    let turns = |frame: usize| {
+        let Some(before) = frame.checked_sub(1).filter(|_| frame + 1 < frames.len()) else { return false };
+        let z_mm = |frame: usize| frames.position_mm[frame][2];
+        let time_s = |from: usize| frames.t_s[from + 1] - frames.t_s[from];
+        let speed = |from: usize| (z_mm(from + 1) - z_mm(from)) / time_s(from);
+        // Time starts anew with each run.
+        let is_one_run = frames.t_s[before] < frames.t_s[frame] && frames.t_s[frame] < frames.t_s[frame + 1];
+        let least_mm = z_mm(before).min(z_mm(frame)).min(z_mm(frame + 1));
+        let least_mm_per_s = TURN_MM_PER_S.max(jitter_mm / time_s(before).min(time_s(frame)));
+        is_one_run && least_mm < CLEAR_MM && (speed(frame) - speed(before)).abs() > least_mm_per_s
+    };
+    (0..frames.len()).map(turns).collect()
 }
 
 /// Median time between frames.
@@ -113,3 +164,7 @@ fn falls(frames: &Frames) -> impl Iterator<Item = Fall> {
 pub(crate) fn pressing(phase: Phase) -> bool {
     matches!(phase, Phase::Load | Phase::Hold | Phase::Unload)
 }
+
+#[cfg(test)]
+#[path = "motion_tests.rs"]
+mod tests;

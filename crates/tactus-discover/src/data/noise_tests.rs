@@ -294,6 +294,25 @@ fn one_frame_a_press_has_no_floor_if_no_press_repeats() {
     }
 }
 
+/// The tip goes up and down all the time, and comes to the same depth in every press again and again.
+#[test]
+fn one_press_does_not_repeat_itself() {
+    let swings = |presses: usize| {
+        let mut noise = Autoregressive::new(5, 0.6);
+        let mut frames = Frames::new(ELEMENTS);
+        for frame in 0..240 {
+            let place = (frame * presses / 240) as f64;
+            let z_mm = [-0.2, -0.3, -0.4, -0.3][frame % 4];
+            let counts = noise.next().map(|noise| 50.0 + 300.0 * z_mm + 2.0 * noise);
+            push(&mut frames, i32::try_from(frame * presses / 240).unwrap(), [place, 1.0, z_mm], counts, 0.0);
+        }
+        frames
+    };
+    for presses in [1, 4] {
+        assert_eq!(floor(&swings(presses), 0.0), Floor::None, "{presses}");
+    }
+}
+
 #[test]
 fn short_presses_that_repeat_give_the_autocorrelation_too() {
     let frames = presses(3, 40, 12, 3, 0.0);

@@ -100,10 +100,11 @@ impl Prepared<'_> {
                 windows.push(window);
             }
         }
+        let turns = turns(frames);
         // What a converter that is not as declared does to a moving signal is no normal noise.
         let is_smooth = |frame: usize| {
             is_fitted(frame)
-                && !turns(frames, frame)
+                && !turns[frame]
                 && (self.converter.is_none() || self.still[frame] >= WINDOW_FRAMES)
         };
         let is_one_run = |frame: usize| self.whole.run[frame - 1] == self.whole.run[frame + 1];

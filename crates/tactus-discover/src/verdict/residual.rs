@@ -135,7 +135,7 @@ impl Prepared<'_> {
 
     /// The structured part of a residual on presses: among all readings or among those with a signal.
     pub(super) fn structured(&self, of: &Residual, presses: Presses, floor: Floor) -> Option<Structured> {
-        let (elements, turns) = (self.frames.elements, self.turns());
+        let (elements, turns) = (self.frames.elements, turns(self.frames));
         let is_known = |place: usize| !turns[place / elements];
         let noise_counts = &self.noise.by_element_counts;
         let has_signal =
@@ -150,7 +150,7 @@ impl Prepared<'_> {
 
     /// A warning if much is structured in the frames that are not judged.
     pub(super) fn not_judged(&self, of: &Residual, floor: Floor) -> Option<String> {
-        let (elements, turns) = (self.frames.elements, self.turns());
+        let (elements, turns) = (self.frames.elements, turns(self.frames));
         let part = self.structured_among(of, Presses::HeldOut, floor, |place| turns[place / elements])?;
         (part.rms_noise > SEEN_NOISE).then(|| {
             format!(
@@ -159,11 +159,6 @@ impl Prepared<'_> {
                 part.rms_noise
             )
         })
-    }
-
-    /// Whether the stage starts or stops near the surface, for each frame.
-    fn turns(&self) -> Vec<bool> {
-        (0..self.frames.len()).map(|frame| turns(self.frames, frame)).collect()
     }
 
     /// How much of what a model leaves on held-out presses another model, the fitted one, closes.
@@ -185,7 +180,7 @@ impl Prepared<'_> {
         of_estimates: f64,
         floor: Floor,
     ) -> Option<Closed> {
-        let (elements, turns) = (self.frames.elements, self.turns());
+        let (elements, turns) = (self.frames.elements, turns(self.frames));
         let of_before = |before: &Readings<'_>| {
             let of_both = |after: &Readings<'_>| {
                 closed([before, after], of_estimates, |place| !turns[place / elements])

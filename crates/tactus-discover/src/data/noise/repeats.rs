@@ -23,7 +23,7 @@ use tactus_model::Phase;
 use super::stretches::stretches;
 use super::{ALIKE_Z, DIFFERENCES_SHARE, FREEDOM_LEAST, Noise, bias_variance, pooled, repeated_frames};
 use crate::data::frames::Frames;
-use crate::data::motion::{STILL_MM, pressing};
+use crate::data::motion::{pressing, still_mm};
 use crate::numbers::median;
 
 /// Places in the same square of this width are one place.
@@ -91,9 +91,10 @@ pub(super) fn noise(frames: &Frames, still: &[usize], step_counts: f64) -> Optio
     Some((noise, freedom))
 }
 
-/// The dwells in contact of each command, in order of time.
+/// The dwells in contact of each command, in order of time: the first one of each press. What follows in the same press is no other one.
 fn dwells(frames: &Frames, still: &[usize]) -> BTreeMap<Command, Vec<Range<usize>>> {
     let mut dwells: BTreeMap<Command, Vec<Range<usize>>> = BTreeMap::new();
+    let still_mm = still_mm(frames);
     let mut run = 0;
     for dwell in stretches(frames, still) {
         let frame = dwell.start;
@@ -117,9 +118,12 @@ fn dwells(frames: &Frames, still: &[usize]) -> BTreeMap<Command, Vec<Range<usize
             indenter: frames.indenter[frame],
             place: [nearest(x_mm, PLACE_MM), nearest(y_mm, PLACE_MM)],
             depth: nearest(z_mm, DEPTH_MM),
-            upward: !begins && z_mm > frames.position_mm[frame - 1][2] + STILL_MM,
+            upward: !begins && z_mm > frames.position_mm[frame - 1][2] + still_mm,
         };
-        dwells.entry(command).or_default().push(dwell);
+        let of_command = dwells.entry(command).or_default();
+        if of_command.last().is_none_or(|last| press(last.start) != press(frame)) {
+            of_command.push(dwell);
+        }
     }
     dwells
 }
