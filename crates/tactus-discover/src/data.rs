@@ -30,6 +30,8 @@
 //! | contacts.rs | `SAME_DEPTH_MM` | `0.03` | convention | what differs by less is one setting |
 //! | contacts.rs | `SAME_PLACE_MM` | `0.05` | convention | the same, of places |
 //! | contacts.rs | `SAME_SPEED_RATIO` | `1.5` | convention | the same, of speeds |
+//! | contacts.rs | `REST_STRIDES` | `3` | convention | a tenth of a second |
+//! | contacts.rs | `BACK_STRIDES` | `600` | cost | twenty seconds |
 //! | contacts.rs | `RISES_MM` | `0.005` | convention | as repeats tell depths apart |
 //! | contacts.rs | `FRAMES_MANY` | `20` | convention | more than a start and a stop have |
 //! | contacts.rs | `VARIED_SPEED_RATIO` | `2.0` | convention | quartiles of one speed are alike |
@@ -52,13 +54,16 @@
 //! | faulty.rs | `SHIFTED_LEAST` | `3` | derived | one more than the paper's two faulty elements (Sec. 2.2), which are no shift |
 //! | history.rs | `ASIDE_MM` | `0.05` | convention | shorter moves have no direction |
 //! | motion.rs | `STILL_MM` | `0.001` | convention | a smaller movement counts as none |
+//! | motion.rs | `STRIDE_S` | `1.0 / 30.0` | convention | steps and lags were chosen with the paper's sensor |
+//! | motion.rs | `PAUSE` | `2.5` | convention | more than a lost frame |
 //! | motion.rs | `JITTER_MOST_MM` | `0.02` | convention | as repeats tell places apart |
 //! | motion.rs | `JITTER_LEAST` | `20` | convention | a standard error of some 16 % |
 //! | motion.rs | `JITTER_Z` | `6.0` | derived | `2e-9` of a normal distribution lies beyond |
 //! | motion.rs | `CLEAR_MM` | `0.25` | convention | above it movements do not affect readings |
 //! | motion.rs | `TURN_MM_PER_S` | `1.2` | convention | a change by more is a start or a stop |
 //! | noise.rs | `SETTLED_S` | `1.0` | convention | a second after a stop |
-//! | noise.rs | `PLATEAU` | `20..=30` | convention | about a second of the paper's sensor |
+//! | noise.rs | `PLATEAU` | `20..=30` | convention | about a second |
+//! | noise.rs | `LEVELLED` | `1.3` | derived | from a correlation of `1 / e` at the end of the plateau, in the comment |
 //! | noise.rs | `ALIKE_Z` | `3.0` | convention | three standard errors |
 //! | noise.rs | `PAIRS_LEAST` | `20` | convention | a standard error of some 16 % |
 //! | noise.rs | `FREEDOM_LEAST` | `10.0` | derived | a standard error of 22 % |

@@ -6,13 +6,17 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use tactus_model::Phase;
 
 use super::frames::Frames;
-use super::motion::{pressing, still, still_mm};
+use super::motion::{pressing, still, still_mm, stride};
 
 /// Depths, places and speeds that differ by less count as the same.
 const SAME_DEPTH_MM: f64 = 0.03;
 const SAME_PLACE_MM: f64 = 0.05;
 const SAME_SPEED_RATIO: f64 = 1.5;
-/// The tip rises if it does by more from frame to frame.
+/// The tip rests if it is at the same place after so many strides.
+const REST_STRIDES: usize = 3;
+/// A way from elsewhere to a place is looked for in so many strides before.
+const BACK_STRIDES: usize = 600;
+/// The tip rises if it does by more over a [`stride`].
 const RISES_MM: f64 = 0.005;
 /// The speed of a load varies if it has so many frames and its quartiles differ by more than this factor: then they are no frames in
 /// which a move at one speed starts or stops.
@@ -27,6 +31,8 @@ pub(crate) struct Contacts<'a> {
     /// First frame, and the one after the last.
     spans: Vec<[usize; 2]>,
     still: Vec<usize>,
+    /// Frames of a [`stride`].
+    stride: usize,
     places: usize,
 }
 
@@ -52,7 +58,7 @@ impl<'a> Contacts<'a> {
         }
         let place = |[first, _]: &[usize; 2]| [0, 1].map(|axis| frames.position_mm[*first][axis]);
         let places = distinct_places(spans.iter().map(place));
-        Self { frames, spans, still: still(frames), places }
+        Self { frames, spans, still: still(frames), stride: stride(frames), places }
     }
 
     pub(crate) fn count(&self) -> usize {
@@ -65,8 +71,9 @@ impl<'a> Contacts<'a> {
             .spans
             .iter()
             .flat_map(|[first, end]| {
-                let rests =
-                    (*first..*end).filter(|frame| self.still[*frame] == 3).map(|frame| self.depth_mm(frame));
+                let rests = (*first..*end)
+                    .filter(|frame| self.still[*frame] == REST_STRIDES * self.stride)
+                    .map(|frame| self.depth_mm(frame));
                 rests.chain([(*first..*end).map(|frame| self.depth_mm(frame)).fold(0.0, f64::max)])
             })
             .filter(|depth_mm| *depth_mm > 0.0)
@@ -100,9 +107,8 @@ impl<'a> Contacts<'a> {
     /// True if the tip rises within a contact.
     pub(crate) fn falls_in_contact(&self) -> bool {
         let least_mm = RISES_MM.max(still_mm(self.frames));
-        self.spans.iter().any(|[first, end]| {
-            (first + 1..*end).any(|frame| self.depth_mm(frame) < self.depth_mm(frame - 1) - least_mm)
-        })
+        let rises = |frame: usize| self.depth_mm(frame) < self.depth_mm(frame - self.stride) - least_mm;
+        self.spans.iter().any(|[first, end]| (first + self.stride..*end).any(rises))
     }
 
     /// Number of loading speeds. A load whose speed changes on the way, as in a half-sine stroke, has two.
@@ -176,7 +182,8 @@ impl<'a> Contacts<'a> {
     /// A contact's place, and whether it was last approached in the positive direction of x and of y.
     fn from(&self, first: usize) -> Option<([f64; 2], Sides)> {
         let [x, y, _] = self.frames.position_mm[first];
-        let before = (0..first).rev().take(600).map(|frame| self.frames.position_mm[frame]);
+        let before =
+            (0..first).rev().take(BACK_STRIDES * self.stride).map(|frame| self.frames.position_mm[frame]);
         let [from_x, from_y, _] = before.into_iter().find(|at| far([at[0], at[1]], [x, y]))?;
         Some(([x, y], [from_x < x - SAME_PLACE_MM, from_y < y - SAME_PLACE_MM]))
     }

@@ -1,8 +1,12 @@
 //! What the sensor has been through before each bin: contact, rest, speed, place and the largest depth so far.
+//!
+//! How the tip moves is told by its steps over a [`stride`].
+
+use std::collections::VecDeque;
 
 use super::bins::Bins;
 use super::frames::{Frames, OnWay};
-use super::motion::still_mm;
+use super::motion::{still_mm, stride};
 
 /// A sideways move shorter than this has no direction.
 const ASIDE_MM: f64 = 0.05;
@@ -49,8 +53,8 @@ impl History {
             last_place_mm: Vec::with_capacity(count),
             temperature_c: empty(),
         };
-        let still_mm = still_mm(frames);
-        let start = || SensorHistory { still_mm, ..SensorHistory::default() };
+        let (still_mm, stride) = (still_mm(frames), stride(frames));
+        let start = || SensorHistory { still_mm, stride, ..SensorHistory::default() };
         let mut state = start();
         let mut next = 0;
         let mut run = usize::MAX;
@@ -91,7 +95,9 @@ impl History {
 struct SensorHistory {
     /// A movement that is no greater counts as none.
     still_mm: f64,
-    last: Option<(f64, [f64; 3])>,
+    stride: usize,
+    /// Times and places before: from a stride ago on.
+    before: VecDeque<(f64, [f64; 3])>,
     depth_mm: f64,
     contact_s: f64,
     release_s: Option<f64>,
@@ -113,7 +119,7 @@ impl SensorHistory {
     fn take(&mut self, moment: OnWay) {
         let OnWay { t_s, position_mm: at, press, .. } = moment;
         let depth_mm = -at[2];
-        if let Some((last_s, last)) = self.last {
+        if let Some((last_s, last)) = self.before.front().copied() {
             let dt_s = (t_s - last_s).max(1e-6);
             let fell_mm = last[2] - at[2];
             if fell_mm.abs() > self.still_mm {
@@ -154,6 +160,9 @@ impl SensorHistory {
             self.release_s = Some(t_s);
         }
         self.depth_mm = depth_mm;
-        self.last = Some((t_s, at));
+        if self.before.len() == self.stride {
+            self.before.pop_front();
+        }
+        self.before.push_back((t_s, at));
     }
 }

@@ -9,6 +9,10 @@ use crate::numbers::{NORMAL_PER_MEDIAN, median};
 
 /// A smaller movement counts as none, unless positions jitter by more.
 const STILL_MM: f64 = 0.001;
+/// What a step from frame to frame means is one over this time where frames are nearer to each other: that of the paper's sensor.
+const STRIDE_S: f64 = 1.0 / 30.0;
+/// An interval that is longer than so many usual ones is a pause.
+const PAUSE: f64 = 2.5;
 /// A jitter of positions is told from rests in which no step from frame to frame is longer.
 const JITTER_MOST_MM: f64 = 0.02;
 /// Fewer second differences of positions do not tell a jitter.
@@ -84,21 +88,35 @@ pub(crate) fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
     still
 }
 
-/// For every frame, whether the stage starts or stops at it, near the surface or in contact.
+/// Number of frames in [`STRIDE_S`]; at least 1.
+pub(crate) fn stride(frames: &Frames) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+    let stride = (STRIDE_S / interval_s(frames)).round() as usize;
+    stride.max(1)
+}
+
+/// For every frame, whether the stage starts or stops at it, near the surface or in contact. From press to press it does neither.
 pub(crate) fn turns(frames: &Frames) -> Vec<bool> {
-    let still_mm = still_mm(frames);
+    let (still_mm, stride) = (still_mm(frames), stride(frames));
+    let longest_s = PAUSE * stride as f64 * interval_s(frames);
     // A jitter makes a second difference of so much at most.
     let jitter_mm = if still_mm > STILL_MM { 3.0_f64.sqrt() * still_mm } else { 0.0 };
     let turns = |frame: usize| {
-        let Some(before) = frame.checked_sub(1).filter(|_| frame + 1 < frames.len()) else { return false };
+        let after = frame + stride;
+        let Some(before) = frame.checked_sub(stride).filter(|_| after < frames.len()) else { return false };
         let z_mm = |frame: usize| frames.position_mm[frame][2];
-        let time_s = |from: usize| frames.t_s[from + 1] - frames.t_s[from];
-        let speed = |from: usize| (z_mm(from + 1) - z_mm(from)) / time_s(from);
+        let time_s = |from: usize| frames.t_s[from + stride] - frames.t_s[from];
+        let speed = |from: usize| (z_mm(from + stride) - z_mm(from)) / time_s(from);
         // Time starts anew with each run.
-        let is_one_run = frames.t_s[before] < frames.t_s[frame] && frames.t_s[frame] < frames.t_s[frame + 1];
-        let least_mm = z_mm(before).min(z_mm(frame)).min(z_mm(frame + 1));
+        let is_one_way =
+            [before, frame].into_iter().all(|from| (f64::MIN_POSITIVE..=longest_s).contains(&time_s(from)));
+        let mut presses =
+            [before, frame, after].into_iter().map(|one| frames.press[one]).filter(|press| *press >= 0);
+        let is_one_press = presses.next().is_none_or(|press| presses.all(|other| other == press));
+        let least_mm = z_mm(before).min(z_mm(frame)).min(z_mm(after));
         let least_mm_per_s = TURN_MM_PER_S.max(jitter_mm / time_s(before).min(time_s(frame)));
-        is_one_run && least_mm < CLEAR_MM && (speed(frame) - speed(before)).abs() > least_mm_per_s
+        let changes = (speed(frame) - speed(before)).abs() > least_mm_per_s;
+        is_one_way && is_one_press && least_mm < CLEAR_MM && changes
     };
     (0..frames.len()).map(turns).collect()
 }
@@ -148,13 +166,15 @@ impl Fall {
     }
 }
 
+/// The same over a [`stride`].
 fn falls(frames: &Frames) -> impl Iterator<Item = Fall> {
-    (1..frames.len()).filter_map(|later| {
-        let pair = [later - 1, later];
+    let stride = stride(frames);
+    (stride..frames.len()).filter_map(move |later| {
+        let pair = [later - stride, later];
         let is_load = pair.iter().all(|one| frames.phase[*one] == Phase::Load);
         let [press, press_later] = pair.map(|one| frames.press[one]);
-        let way_mm = frames.position_mm[later - 1][2] - frames.position_mm[later][2];
-        let time_s = frames.t_s[later] - frames.t_s[later - 1];
+        let way_mm = frames.position_mm[later - stride][2] - frames.position_mm[later][2];
+        let time_s = frames.t_s[later] - frames.t_s[later - stride];
         let falls = is_load && press == press_later && way_mm > STILL_MM && time_s > 0.0;
         falls.then_some(Fall { press, way_mm, time_s })
     })

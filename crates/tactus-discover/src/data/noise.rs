@@ -19,12 +19,16 @@ use std::f64::consts::PI;
 
 use super::floor::Floor;
 use super::frames::Frames;
+use super::motion::stride;
 use crate::numbers::median;
 
 /// The tip is at rest if it was still for this time.
 const SETTLED_S: f64 = 1.0;
-/// Lags of the plateau, in frames: about a second of the paper's sensor.
+/// Lags of the plateau, in strides: about a second.
 const PLATEAU: std::ops::RangeInclusive<usize> = 20..=30;
+/// With strides of several frames, `D` has levelled off if it rises by no more than this factor along the plateau. That of first-order autoregressive
+/// noise whose correlation falls to `1 / e` there, as short dwells must show it too, rises by `(1 - 1 / e) / (1 - e^(-2 / 3))`.
+const LEVELLED: f64 = 1.3;
 /// Elements whose noise differs by fewer standard errors are taken to have the same noise.
 const ALIKE_Z: f64 = 3.0;
 /// Least number of pairs of frames for an estimate.
@@ -101,45 +105,54 @@ impl Noise {
         step_counts: f64,
     ) -> Option<(Self, f64)> {
         let elements = frames.elements;
-        let lags = *PLATEAU.end();
-        let mut squares = vec![0.0_f64; (lags + 1) * elements];
-        let mut pairs = vec![0_usize; lags + 1];
+        let stride = stride(frames);
+        // Every lag up to that of the plateau's end in strides, and whole strides from there on.
+        let short = 1..=*PLATEAU.end();
+        let long = short.clone().map(|lag| lag * stride).filter(|lag| lag > PLATEAU.end());
+        let lags: Vec<usize> = short.chain(long).collect();
+        let mut squares = vec![0.0_f64; lags.len() * elements];
+        let mut pairs = vec![0_usize; lags.len()];
         let settled = settled(frames, still);
-        for lag in 1..=lags {
+        for (place, lag) in lags.iter().copied().enumerate() {
             for frame in lag..frames.len() {
                 if still[frame] < lag || !settled[frame - lag] {
                     continue;
                 }
-                pairs[lag] += 1;
+                pairs[place] += 1;
                 let of = |frame: usize| &values[frame * elements..(frame + 1) * elements];
                 let (now, then) = (of(frame), of(frame - lag));
-                for ((sum, now), then) in squares[lag * elements..].iter_mut().zip(now).zip(then) {
+                for ((sum, now), then) in squares[place * elements..].iter_mut().zip(now).zip(then) {
                     *sum += f64::from(now - then).powi(2) / 2.0;
                 }
             }
         }
-        let longest = PLATEAU.rev().find(|lag| pairs[*lag] >= PAIRS_LEAST)?;
-        let plateau = *PLATEAU.start()..=longest;
+        // Places of the lags of the plateau that have enough pairs.
+        let is_far = |place: &usize| lags[*place] >= PLATEAU.start() * stride;
+        let longest = (0..lags.len()).filter(is_far).rfind(|place| pairs[*place] >= PAIRS_LEAST)?;
+        let first = (0..lags.len()).find(is_far)?;
+        let plateau = first..=longest;
         // The variance of rounding of a uniform distribution.
         let rounding = step_counts * step_counts / 12.0;
         let variance = |element: usize| {
-            let (sum, count) = plateau.clone().fold((0.0, 0), |(sum, count), lag| {
-                (sum + squares[lag * elements + element], count + pairs[lag])
+            let (sum, count) = plateau.clone().fold((0.0, 0), |(sum, count), place| {
+                (sum + squares[place * elements + element], count + pairs[place])
             });
             (sum / count as f64).max(rounding).max(f64::MIN_POSITIVE)
         };
         let variances: Vec<f64> = (0..elements).map(variance).collect();
-        let correlation: Vec<f64> = (0..=lags)
-            .map(|lag| match lag {
-                0 => 1.0,
-                _ if pairs[lag] < PAIRS_LEAST => 0.0,
-                _ => {
-                    let shares =
-                        (0..elements).map(|e| squares[lag * elements + e] / pairs[lag] as f64 / variances[e]);
-                    (1.0 - median(&shares.collect::<Vec<_>>())).clamp(0.0, 1.0)
-                }
-            })
-            .collect();
+        // `D` at a lag, as a share of the variance.
+        let risen = |place: usize| {
+            let share = |e: usize| squares[place * elements + e] / pairs[place] as f64 / variances[e];
+            median(&(0..elements).map(share).collect::<Vec<_>>())
+        };
+        if stride > 1 && risen(longest) > LEVELLED * risen(first) {
+            return None;
+        }
+        let at_lags = (0..lags.len()).map(|place| match pairs[place] {
+            ..PAIRS_LEAST => 0.0,
+            _ => (1.0 - risen(place)).clamp(0.0, 1.0),
+        });
+        let correlation = at_each(&lags, &at_lags.collect::<Vec<f64>>());
         let independent = pairs[longest] as f64 / memory_frames(&correlation) as f64;
         let variances = pooled(&variances, ALIKE_Z * (2.0 / independent).sqrt());
         let typical = median(&variances);
@@ -222,6 +235,21 @@ pub(super) fn repeated_frames(frames: &Frames, still: &[usize]) -> f64 {
         }
     }
     if readings > 0.0 { squares / readings } else { 1.0 }
+}
+
+/// A correlation at each lag from 0 on, straight between the lags at which it is known, which rise.
+fn at_each(lags: &[usize], known: &[f64]) -> Vec<f64> {
+    let mut all = vec![1.0];
+    for (lag, value) in lags.iter().zip(known) {
+        let (from, before) = (all.len() - 1, all[all.len() - 1]);
+        let between = |between: usize| {
+            let share = (between - from) as f64 / (lag - from) as f64;
+            before + share * (value - before)
+        };
+        all.extend((from + 1..*lag).map(between));
+        all.push(*value);
+    }
+    all
 }
 
 fn memory_frames(correlation: &[f64]) -> usize {

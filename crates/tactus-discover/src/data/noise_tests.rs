@@ -7,6 +7,43 @@ use super::Noise;
 use crate::data::motion::still;
 use crate::{Floor, Frames};
 
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "frames or nanoseconds of a minute"
+)]
+fn whole(number: f64) -> usize {
+    number.round() as usize
+}
+
+/// A tip at rest with frames at this rate, under noise of standard deviation 3 with this correlation time, for a minute.
+fn resting_at(rate_hz: f64, time_s: f64) -> Frames {
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    let kept = (-1.0 / (rate_hz * time_s)).exp();
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let mut noise: [f64; 8] = std::array::from_fn(|_| 3.0 * normal());
+    let mut frames = Frames::new(8);
+    for frame in 0..whole(60.0 * rate_hz) {
+        for noise in &mut noise {
+            *noise = kept * *noise + 3.0 * (1.0 - kept * kept).sqrt() * normal();
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
+        let counts = noise.map(|noise| (100.0 + noise) as f32);
+        frames.push(RowView {
+            run: "a",
+            press: -1,
+            phase: Phase::Idle,
+            t_ns: i64::try_from(whole(frame as f64 / rate_hz * 1e9)).unwrap(),
+            position_mm: [0.0, 0.0, 2.0],
+            covering_mm: 1.0,
+            indenter: "cyl1",
+            temperature_c: None,
+            counts: &counts,
+        });
+    }
+    frames
+}
+
 /// A tip at rest under first-order autoregressive noise of standard deviation 3, beside a slow ramp.
 fn resting(phi: f64) -> Frames {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
@@ -52,6 +89,30 @@ fn the_noise_is_that_of_one_reading_at_any_autocorrelation() {
         assert!(matches!(floor(&frames, 0.01), Floor::Time { .. }));
         assert!((noise.rms_counts - 3.0).abs() < 0.1, "{phi}: {}", noise.rms_counts);
         assert!((noise.correlation[1] - phi).abs() < 0.05, "{phi}: {:?}", noise.correlation);
+    }
+}
+
+#[test]
+fn the_noise_is_that_of_one_reading_at_any_rate() {
+    for rate_hz in [30.0, 50.0, 100.0, 1000.0] {
+        for time_s in [0.001, 0.15] {
+            let noise = of_rests(&resting_at(rate_hz, time_s)).unwrap();
+            assert!((noise.rms_counts / 3.0 - 1.0).abs() < 0.08, "{rate_hz} {time_s}: {}", noise.rms_counts);
+            for lag_s in [0.0, 0.05, 0.1, 0.2, 0.4, 0.9] {
+                let lag = (lag_s * rate_hz).round();
+                let want = (-lag / rate_hz / time_s).exp();
+                let got = noise.correlation_at(whole(lag));
+                assert!((got - want).abs() < 0.1, "{rate_hz} {time_s} {lag_s}: {got} of {want}");
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_that_outlasts_the_plateau_is_not_known_at_a_high_rate() {
+    for rate_hz in [100.0, 1000.0] {
+        let frames = resting_at(rate_hz, 5.0);
+        assert!(of_rests(&frames).is_none(), "{rate_hz}");
     }
 }
 
