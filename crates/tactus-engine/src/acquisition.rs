@@ -119,6 +119,11 @@ impl Mailbox {
         timeout(ANSWER_MAX, answered).await.map_err(|_| Gone)?.map_err(|_| Gone)
     }
 
+    /// True if the task is gone for good, not only slow.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.0.is_closed()
+    }
+
     /// Has something done, in the order of the calls, without waiting for it.
     pub(crate) async fn tell(
         &self,

@@ -14,7 +14,7 @@ use crate::run::Broken;
 /// Longest time that a stopped stage may take to stand still.
 const STANDSTILL: Duration = Duration::from_secs(5);
 
-/// Greatest number of commands of one retract that the stage may refuse or lose before it counts as failed.
+/// Greatest number of commands of one retract that the stage may refuse or lose without having risen before it counts as failed.
 const TROUBLES_MAX: u32 = 5;
 
 /// Greatest number of stops that one retract outlasts. Somebody who stops it more often is told that the tip is not up.
@@ -39,6 +39,16 @@ pub(crate) struct WayUp {
     stopped: Option<MonoTime>,
 }
 
+/// What went wrong in one retract.
+#[derive(Debug)]
+struct Setbacks {
+    /// Since the tip last rose.
+    troubles: u32,
+    stops: u32,
+    /// Greatest height after a try.
+    highest_mm: f64,
+}
+
 /// The tip rises as long as this lives.
 struct Rising<'a>(&'a Shared);
 
@@ -57,6 +67,24 @@ impl WayUp {
             self.stopped = Some(now);
         }
         takes
+    }
+}
+
+impl Setbacks {
+    fn new(z_mm: f64) -> Self {
+        Self { troubles: 0, stops: 0, highest_mm: z_mm }
+    }
+
+    /// Counts what ended a try at this height.
+    fn count(&mut self, error: &Broken, z_mm: f64, tolerance_mm: f64) {
+        if z_mm > self.highest_mm + tolerance_mm {
+            (self.troubles, self.highest_mm) = (0, z_mm);
+        }
+        if matches!(error, Broken::Stage(StageError::Stopped { .. } | StageError::Void(_))) {
+            self.stops += 1;
+        } else {
+            self.troubles += 1;
+        }
     }
 }
 
@@ -140,7 +168,7 @@ impl Shared {
     ///
     /// Returns the height reached, or why the tip could not be retracted.
     pub(crate) async fn retract(&self) -> Result<f64, Broken> {
-        let (mut troubles, mut stops) = (0, 0);
+        let mut setbacks = Setbacks::new(self.position_mm()[2]);
         let _rising = Rising::begin(self);
         loop {
             self.stand_still().await;
@@ -148,26 +176,26 @@ impl Shared {
                 Ok([_, _, z_mm]) => return Ok(z_mm),
                 Err(error) => error,
             };
-            if matches!(
+            // An acquisition task that does not answer may only be slow.
+            let is_gone = matches!(error, Broken::Gone(_)) && self.acquisition.is_closed();
+            let is_lost = matches!(
                 error,
-                Broken::Gone(_)
-                    | Broken::Denied(Denied::Fault(_))
+                Broken::Denied(Denied::Fault(_))
                     | Broken::Stage(StageError::Unhomed | StageError::Alarm { .. })
-            ) {
+            );
+            if is_gone || is_lost {
                 return Err(error);
-            }
-            if matches!(error, Broken::Stage(StageError::Stopped { .. } | StageError::Void(_))) {
-                stops += 1;
-            } else {
-                troubles += 1;
             }
             if matches!(error, Broken::Denied(Denied::NoStage) | Broken::Stage(StageError::Device(_))) {
                 self.stage_returns().await;
             }
+            let z_mm = self.position_mm()[2];
+            setbacks.count(&error, z_mm, self.service.motion.tolerance_mm);
+            let Setbacks { troubles, stops, .. } = setbacks;
             if troubles > TROUBLES_MAX || stops > STOPS_MAX {
                 return Err(error);
             }
-            tracing::warn!(%error, troubles, stops, "the tip is not up yet: trying again");
+            tracing::warn!(%error, z_mm, troubles, stops, "the tip is not up yet: trying again");
         }
     }
 
