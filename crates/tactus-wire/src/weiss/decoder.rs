@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::packet::{HEADER_BYTES, SYNC};
+use super::packet::{HEADER_BYTES, SYNC, id};
 use super::{BOOT_MESSAGE, Checksum, Packet};
 
 /// Longest payload that [`Decoder::new`] accepts.
@@ -33,7 +33,7 @@ pub struct Decoder {
 pub struct DecoderStats {
     /// Bytes that belonged to no packet.
     pub skipped_bytes: u64,
-    /// Packets with a wrong checksum.
+    /// Packets with a wrong checksum, and frames that have none.
     pub bad_checksums: u64,
     /// Boot messages among the skipped bytes.
     pub boot_messages: u64,
@@ -57,6 +57,8 @@ pub struct ChecksumError {
 enum PacketCandidate {
     /// No packet: the id or the length is impossible.
     Impossible,
+    /// A frame without a payload, and so without a checksum: no frame, but a damaged one.
+    EmptyFrame,
     /// A possible packet that has not arrived completely.
     Unfinished,
     /// A complete packet.
@@ -110,6 +112,11 @@ impl Decoder {
                     self.skip(1);
                     continue;
                 }
+                PacketCandidate::EmptyFrame => {
+                    self.stats.bad_checksums += 1;
+                    self.skip(1);
+                    continue;
+                }
                 PacketCandidate::Unfinished => (self.bytes.len() + 1, None),
                 PacketCandidate::Whole { end, verdict } => (end, Some(verdict)),
             };
@@ -149,7 +156,7 @@ impl Decoder {
 
     fn inspect(&self, at: usize) -> PacketCandidate {
         let Some(rest) = self.bytes.get(at + SYNC.len()..) else { return PacketCandidate::Unfinished };
-        let Some(&[id, length_low, length_high]) = rest.first_chunk() else {
+        let Some(&[kind, length_low, length_high]) = rest.first_chunk() else {
             // The header begins behind the last sync byte, because no id equals one.
             return if rest.first() == Some(&SYNC[0]) {
                 PacketCandidate::Impossible
@@ -158,8 +165,11 @@ impl Decoder {
             };
         };
         let length = usize::from(u16::from_le_bytes([length_low, length_high]));
-        if id == SYNC[0] || length > self.max_payload_bytes {
+        if kind == SYNC[0] || length > self.max_payload_bytes {
             return PacketCandidate::Impossible;
+        }
+        if length == 0 && kind == id::FRAME {
+            return PacketCandidate::EmptyFrame;
         }
         if length == 0 {
             return PacketCandidate::Whole { end: at + HEADER_BYTES, verdict: Ok(()) };
@@ -173,7 +183,7 @@ impl Decoder {
         let verdict = if expected == found {
             Ok(())
         } else {
-            Err(ChecksumError { id, bytes: length, expected, found })
+            Err(ChecksumError { id: kind, bytes: length, expected, found })
         };
         PacketCandidate::Whole { end: at + HEADER_BYTES + length + self.checksum.bytes(), verdict }
     }
