@@ -321,15 +321,29 @@ impl Shared {
         }
     }
 
-    /// Waits until a stopped stage stands still. If it does not, the next command fails.
-    async fn stand_still(&self) {
+    /// Waits until a stopped stage stands still. A stage that stays in a hold is stopped again, which frees it. If it does not
+    /// come to stand, the next command fails.
+    pub(crate) async fn stand_still(&self) {
+        if self.stands_in_time().await {
+            return;
+        }
+        if self.status() == StageStatus::Hold {
+            tracing::warn!("the stage stays in a hold: it is stopped again");
+            self.stage.stop();
+            if self.stands_in_time().await {
+                return;
+            }
+        }
+        tracing::warn!("the stage did not come to a standstill within {STANDSTILL:?}");
+    }
+
+    /// True once the stage neither moves nor is in a hold, if that comes in time.
+    async fn stands_in_time(&self) -> bool {
         let mut state = self.stage.state();
         let standing = state.wait_for(|report| {
             !matches!(report.status(), StageStatus::Moving | StageStatus::Hold | StageStatus::Homing)
         });
-        if timeout(STANDSTILL, standing).await.is_err() {
-            tracing::warn!("the stage did not come to a standstill within {STANDSTILL:?}");
-        }
+        timeout(STANDSTILL, standing).await.is_ok()
     }
 }
 

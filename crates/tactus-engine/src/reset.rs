@@ -13,6 +13,8 @@ impl Shared {
     pub(crate) async fn reset(&self) -> Result<(), ResetError> {
         let not_ready = |why: Broken| ResetError::NotReady(why.to_string());
         self.begin_reset().await?;
+        // A controller in a hold would refuse to home.
+        self.stand_still().await;
         if self.status() == StageStatus::Idle {
             // A tip that is too deep, or under a sensor that is silent, breaks a rule at once: up first, which is always
             // permitted.
@@ -37,6 +39,7 @@ impl Shared {
     /// What a run does that replaces a reset: it homes a stage that does not know where it is.
     pub(crate) async fn reset_for_run(&self) -> Result<(), Broken> {
         self.begin_reset().await?;
+        self.stand_still().await;
         if self.status() == StageStatus::Unhomed {
             info!("homing the stage");
             self.home().await?;

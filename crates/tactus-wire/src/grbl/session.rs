@@ -65,6 +65,8 @@ pub struct Session {
     stood_mm: Option<[f64; 3]>,
     /// The last two reports agree on where it stands.
     is_steady: bool,
+    /// Resets in a row after which the controller was in a hold.
+    frees: u32,
     unknown_lines: u64,
     actions: Vec<Action>,
 }
@@ -93,6 +95,7 @@ impl Session {
             is_proved: false,
             stood_mm: None,
             is_steady: false,
+            frees: 0,
             unknown_lines: 0,
             actions: Vec::new(),
         })
@@ -241,7 +244,7 @@ impl stage::Session for Session {
                 self.reset(now, Purpose::Greet, 1);
             }
             Phase::Resetting { purpose, resets: 0, .. } => self.reset(now, purpose, 1),
-            // It has been reset already, so nothing moves.
+            // It has been reset already, so nothing moves. Should a stop that others wrote hold it after that, the look finds it.
             Phase::Resetting { .. } | Phase::Over => {}
         }
         self.finish(now)

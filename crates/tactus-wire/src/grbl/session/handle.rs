@@ -17,6 +17,9 @@ const LOOKS: u32 = 2;
 /// Reports after which a look without two that agree has failed.
 const LOOKS_MAX: u32 = 8;
 
+/// Resets in a row of a controller that does not come out of a hold: a door may be open.
+const FREES_MAX: u32 = 5;
+
 /// The error that may precede the banner at boot. It answers no line.
 const ERROR_AT_BOOT: u8 = 7;
 
@@ -341,8 +344,28 @@ impl Session {
         }
     }
 
+    /// Frees a controller that is in a hold after a reset: a hold may have come after it, from the guard of the driver, from
+    /// somebody's button. While it decelerates, a reset would cost the position.
+    fn free(&mut self, now: Duration, purpose: Purpose) {
+        match purpose {
+            Purpose::Stop { failure, .. } if self.moves() => self.hold(now, failure),
+            purpose => self.reset(now, purpose, 1),
+        }
+    }
+
     fn conclude_look(&mut self, now: Duration, purpose: Purpose) {
         let position_mm = self.position_mm;
+        if self.is_held() && !matches!(purpose, Purpose::Look { .. }) {
+            if self.frees < FREES_MAX {
+                self.frees += 1;
+                if !matches!(purpose, Purpose::Greet) {
+                    self.report();
+                }
+                return self.free(now, purpose);
+            }
+        } else {
+            self.frees = 0;
+        }
         match purpose {
             Purpose::Greet => self.ask(now, Query::Build, 1),
             Purpose::Recover => {
@@ -354,7 +377,8 @@ impl Session {
                 self.phase = Phase::Ready;
                 self.homed = false;
                 self.report();
-                self.done(self.check_alarm().map(|()| position_mm));
+                let free = if self.is_held() { Err(Failure::NotIdle { position_mm }) } else { Ok(()) };
+                self.done(self.check_alarm().and(free).map(|()| position_mm));
             }
             Purpose::Stop { failure, held_mm } => {
                 let kept =

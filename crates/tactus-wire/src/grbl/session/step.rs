@@ -272,6 +272,12 @@ impl Session {
         self.state.is_some_and(|state| matches!(state, Run | Jog | Holding | Home))
     }
 
+    /// True if it takes no move until it is reset, by the last report.
+    pub(super) fn is_held(&self) -> bool {
+        use MachineState::{Check, Door, Hold, Holding, Sleep, Tool};
+        self.state.is_some_and(|state| matches!(state, Hold | Holding | Door | Check | Sleep | Tool))
+    }
+
     pub(super) fn send(&mut self, byte: u8) {
         self.actions.push(Action::Send(vec![byte]));
     }

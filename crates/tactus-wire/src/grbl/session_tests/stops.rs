@@ -254,3 +254,97 @@ fn a_jog_of_someone_else_is_stopped_too() {
         1100 = Idle 1.210 1.000 5.000",
     );
 }
+
+#[test]
+fn a_controller_that_is_in_a_hold_after_the_reset_is_freed() {
+    // The guard of the driver wrote a stop after the reset.
+    moving(
+        "1008 * stop
+        1008 > !
+        1015 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
+        1015 = Moving 1.400 1.000 5.000
+        1015 > ?
+        1030 < <Hold:0|MPos:1.500,1.000,5.000|FS:0,0>
+        1030 = Hold 1.500 1.000 5.000
+        1030 > ^X
+        1040 < Grbl 1.1h ['$' for help]
+        1040 > ?
+        1050 < <Hold:0|MPos:1.500,1.000,5.000|FS:0,0>
+        1050 = Hold 1.500 1.000 5.000
+        1050 > ^X
+        1060 < Grbl 1.1h ['$' for help]
+        1060 > ?
+        1070 < <Idle|MPos:1.500,1.000,5.000|FS:0,0>
+        1070 = Idle 1.500 1.000 5.000
+        1070 = stopped 1.500 1.000 5.000
+        1080 * move 1.5 1 6 at 10
+        1080 > ?",
+    );
+}
+
+#[test]
+fn a_controller_that_decelerates_after_the_reset_is_awaited_then_freed() {
+    homed(
+        "950 * stop
+        950 > !
+        950 > ?
+        960 < <Hold:0|MPos:1.000,1.000,5.000|FS:0,0>
+        960 = Hold 1.000 1.000 5.000
+        960 > ^X
+        970 < Grbl 1.1h ['$' for help]
+        970 > ?
+        980 < <Hold:1|MPos:1.000,1.000,5.000|FS:0,0>
+        980 = Hold 1.000 1.000 5.000
+        980 > !
+        980 > ?
+        990 < <Hold:0|MPos:1.000,1.000,5.000|FS:0,0>
+        990 = Hold 1.000 1.000 5.000
+        990 > ^X
+        1000 < Grbl 1.1h ['$' for help]
+        1000 > ?
+        1010 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        1010 = Idle 1.000 1.000 5.000",
+    );
+}
+
+#[test]
+fn a_controller_that_stays_in_a_hold_is_reset_a_few_times() {
+    let held = |ms: u32| {
+        format!(
+            "{ms} < Grbl 1.1h ['$' for help]
+            {ms} > ?
+            {ms} < <Door:0|MPos:1.000,1.000,5.000|FS:0,0>
+            {ms} = Hold 1.000 1.000 5.000\n"
+        )
+    };
+    let tries: String = (0..5).map(|at| held(970 + at) + &format!("{} > ^X\n", 970 + at)).collect();
+    homed(&format!(
+        "950 * stop
+        950 > !
+        950 > ?
+        960 < <Hold:0|MPos:1.000,1.000,5.000|FS:0,0>
+        960 = Hold 1.000 1.000 5.000
+        960 > ^X
+        {tries}{}1000 * stop
+        1000 > !
+        1000 > ?",
+        held(975)
+    ));
+}
+
+#[test]
+fn a_hold_after_another_reset_of_the_controller_is_ended_too() {
+    homed(
+        "950 < Grbl 1.1h ['$' for help]
+        950 = suspect: the controller was reset: Grbl 1.1h ['$' for help]
+        950 = Unhomed 1.000 1.000 5.000
+        950 > ?
+        960 < <Hold:0|MPos:0.000,0.000,0.000|FS:0,0>
+        960 = Hold 0.000 0.000 0.000
+        960 > ^X
+        970 < Grbl 1.1h ['$' for help]
+        970 > ?
+        980 < <Idle|MPos:0.000,0.000,0.000|FS:0,0>
+        980 = Unhomed 0.000 0.000 0.000",
+    );
+}
