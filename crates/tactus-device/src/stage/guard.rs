@@ -196,8 +196,10 @@ impl Shared {
     /// Writes the stop, at each look until the driver lives again.
     fn fire(&self, watch: &mut Watch, silent: Duration) {
         let Watch { writer: Some(writer), halt: Some(halt), .. } = watch else { return };
+        let written = writer.write_all(halt);
+        // Only now: a driver that learns of the stop has it behind it, so that what it sends next comes after it.
         let is_first = !self.has_fired.swap(true, Ordering::SeqCst);
-        if let Err(error) = writer.write_all(halt) {
+        if let Err(error) = written {
             tracing::error!(%error, ?silent, "the stage's driver hangs, and the stop cannot be written");
         } else if is_first {
             tracing::error!(?silent, "the stage's driver hangs: the stage was stopped without it");

@@ -32,6 +32,8 @@ fn a_driver_that_gives_no_sign_of_life_in_a_command_is_stopped_for() {
     guard.ready().unwrap();
     guard.begin(b"!".to_vec());
     assert_eq!(written.recv_timeout(LONGEST).unwrap(), b"!");
+    // The driver is told once the stop is written, and so before it is written again.
+    assert_eq!(written.recv_timeout(LONGEST).unwrap(), b"!");
     assert!(guard.has_fired());
 }
 
