@@ -31,10 +31,37 @@ fn recordings(runs: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// True if there is a dwell of a press that is not confirmed.
+/// True if there is a dwell of a press that is neither confirmed nor broken off: a busy machine may starve the sensor, and the
+/// press is repeated.
 fn is_pressing(recording: &Path) -> bool {
     let confirmed = presses(recording).last().map_or(-1, |(press, _)| *press);
-    events(recording).any(|event| matches!(event, Event::DwellDone(dwell) if dwell.press > confirmed))
+    is_pressing_in(confirmed, events(recording))
+}
+
+fn is_pressing_in(confirmed: i32, events: impl Iterator<Item = Event>) -> bool {
+    let mut held = None;
+    for event in events {
+        if let Event::DwellDone(dwell) = &event {
+            held = Some(dwell.press);
+        }
+        if let Event::PressRepeated(repeated) = &event
+            && held == Some(repeated.press)
+        {
+            held = None;
+        }
+    }
+    held.is_some_and(|press| press > confirmed)
+}
+
+#[test]
+fn a_press_that_is_broken_off_is_not_under_way() {
+    let held = |press| Event::DwellDone(pb::DwellDone { press, ..pb::DwellDone::default() });
+    let repeated = |press| Event::PressRepeated(pb::PressRepeated { press, ..pb::PressRepeated::default() });
+    let is_pressing = |events: &[Event]| is_pressing_in(1, events.iter().cloned());
+    assert!(is_pressing(&[held(1), held(2)]));
+    assert!(!is_pressing(&[held(1), held(1)]));
+    assert!(!is_pressing(&[held(2), repeated(2)]));
+    assert!(is_pressing(&[held(2), repeated(2), held(3)]));
 }
 
 fn events(recording: &Path) -> impl Iterator<Item = Event> {

@@ -60,8 +60,9 @@ fn a_service_whose_log_nobody_reads_sees_its_sensor_go() {
     lab.wait_until_pressing();
     lab.mock.type_line("sensor disconnect 60s");
     let (code, said) = client.wait();
-    assert_eq!(code, Some(1), "{said}");
-    assert!(lab.truth()["z_mm"].as_f64().unwrap() > 1.9);
+    let truth = lab.truth();
+    assert_eq!(code, Some(1), "{said}\n{truth}");
+    assert!(truth["z_mm"].as_f64().unwrap() > 1.9, "{said}\n{truth}");
 }
 
 #[test]

@@ -530,7 +530,14 @@ fn check_curve(draft: &Draft, field: &str) -> Result<(), WrongField> {
             ("numbers", vec![offset.abs() + sine.hypot(*cosine)])
         }
         // Each of these is greatest at an end.
-        law => ("numbers", draft.ranges[0].iter().map(|end| law.value(&[*end])).collect()),
+        law @ (Law::Linear { .. }
+        | Law::Power { .. }
+        | Law::Exponential { .. }
+        | Law::Saturating { .. }
+        | Law::Threshold { .. }
+        | Law::Logarithm { .. }) => {
+            ("numbers", draft.ranges[0].iter().map(|end| law.value(&[*end])).collect())
+        }
     };
     values.iter().try_for_each(|value| within(key, *value))?;
     let most = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
