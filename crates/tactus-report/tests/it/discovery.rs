@@ -486,7 +486,7 @@ fn what_no_effect_matches_has_no_name() {
         ">unexplained</span>",
         "from repeats of a place",
         "depends on time since contact and depth",
-        "None was taken: none of them raises the odds enough.",
+        "None was taken: a dependence on place along x, which has no name, explains more.",
     ] {
         assert!(html.contains(text), "{text}");
     }
