@@ -5,6 +5,7 @@
 //! fleet only when it is whole, so a killed ingest leaves no half of one, and the next goes on where it ended.
 
 mod found;
+mod register;
 mod run_writer;
 
 use std::{
@@ -22,10 +23,11 @@ use tactus_work::{Now, for_each};
 use tokio::runtime::Handle;
 
 use crate::{
-    Place,
+    Place, PlaceError,
     output::{in_mb, number_of},
 };
-use found::{Job, Source, found};
+use found::{Job, found};
+use register::Register;
 use run_writer::{RunWriter, WriteError, Written};
 
 /// How runs are ingested.
@@ -58,7 +60,7 @@ pub struct Ingested {
     pub failed: Vec<FailedFile>,
 }
 
-/// A file that could not be ingested.
+/// A file that could not be ingested, or a run of it.
 #[derive(Debug, Clone, Serialize)]
 pub struct FailedFile {
     /// The file.
@@ -77,6 +79,9 @@ pub enum IngestError {
     /// There is nothing to ingest.
     #[error("there is no recording (.mcap) in {}", paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", "))]
     Nothing { paths: Vec<PathBuf> },
+    /// The fleet cannot be read.
+    #[error(transparent)]
+    Place(#[from] PlaceError),
 }
 
 /// Why a job was not done.
@@ -95,10 +100,13 @@ const SCHEMA: &str = "tactus.fleet.ingest/1";
 /// Writes the runs of recordings and measurement tables into a fleet. Folders are searched for recordings. A run that is there already, made
 /// of a file of the same size, is kept.
 ///
+/// A rig has each run once. Of two files with one run, one gives it; a table never replaces what was recorded. The other file is among
+/// [`Ingested::failed`], with the runs that were not taken from it.
+///
 /// Recordings that go on with another's run are read with it, if both are given: presses that were done again are left out.
 ///
 /// # Errors
-/// If a path cannot be read, or there is no recording at all. A file that cannot be ingested stops no other: [`Ingested::failed`] lists it.
+/// If a path or the fleet cannot be read, or there is no recording at all. A file that cannot be ingested stops no other: [`Ingested::failed`] lists it.
 pub fn ingest(
     runtime: &Handle,
     paths: &[PathBuf],
@@ -107,12 +115,17 @@ pub fn ingest(
     progress: &(dyn Fn(Now) + Sync),
 ) -> Result<Ingested, IngestError> {
     let (jobs, unreadable) = found(paths)?;
+    let register = Register::of(runtime, place)?;
+    // Before any table is read, so that none takes the place of a recording.
+    for (source, run) in jobs.iter().flat_map(Job::recorded) {
+        register.give(&run.rig, &run.run_id, &source.path);
+    }
     let shared = Shared {
         now: Mutex::new(Now {
             pieces: 0,
-            pieces_all: jobs.iter().map(|job| job.sources.len()).sum(),
+            pieces_all: jobs.iter().map(|job| job.sources().count()).sum(),
             size: 0,
-            size_all: jobs.iter().flat_map(|job| &job.sources).map(|source| source.bytes).sum(),
+            size_all: jobs.iter().map(Job::bytes).sum(),
         }),
         ingested: Mutex::new(Ingested {
             schema: SCHEMA,
@@ -126,7 +139,7 @@ pub fn ingest(
         }),
     };
     for_each(options.threads, &jobs, |job| {
-        let done = JobInProgress { runtime, place, options, job, open: None, closed: Vec::new() }.run();
+        let done = JobInProgress { runtime, place, register: &register, options, job, open: None, closed: Vec::new() }.run();
         shared.take(job, done, progress);
     });
     let mut ingested = shared.ingested.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -151,8 +164,8 @@ impl Shared {
             }
         }
         let mut now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
-        now.pieces += job.sources.len();
-        now.size += job.sources.iter().map(|source| source.bytes).sum::<u64>();
+        now.pieces += job.sources().count();
+        now.size += job.bytes();
         progress(*now);
     }
 }
@@ -166,6 +179,7 @@ impl Ingested {
     fn add(&mut self, written: Written) {
         match written {
             Written::Kept => self.runs_kept += 1,
+            Written::Refused(failed) => self.failed.push(failed),
             Written::New { rows, bytes, warnings } => {
                 self.runs_written += 1;
                 self.rows += rows;
@@ -201,6 +215,7 @@ impl fmt::Display for Ingested {
 struct JobInProgress<'a> {
     runtime: &'a Handle,
     place: &'a Place,
+    register: &'a Register<'a>,
     options: &'a Options,
     job: &'a Job,
     /// The file of the run whose rows come now.
@@ -213,10 +228,10 @@ impl JobInProgress<'_> {
     fn run(mut self) -> Result<Vec<Written>, JobError> {
         let mut written = Vec::new();
         let (place, runtime) = (self.place, self.runtime);
-        if self.job.sources.iter().all(|source| source.is_kept(runtime, place, self.job)) {
-            return Ok(self.job.sources.iter().map(|_| Written::Kept).collect());
+        if let Some(passed_over) = self.passed_over() {
+            return Ok(passed_over);
         }
-        let paths: Vec<&Path> = self.job.sources.iter().map(|source| source.path.as_path()).collect();
+        let paths: Vec<&Path> = self.job.sources().map(|source| source.path.as_path()).collect();
         let mut problem = None;
         let source = rows::visit(&paths, |rig, row| {
             if problem.is_none() {
@@ -239,6 +254,19 @@ impl JobInProgress<'_> {
         Ok(written)
     }
 
+    /// What becomes of recordings if none has a run to write. Of a table nobody knows its runs before it is read.
+    fn passed_over(&self) -> Option<Vec<Written>> {
+        if self.job.is_table() {
+            return None;
+        }
+        let recorded = self.job.recorded();
+        recorded
+            .map(|(source, run)| {
+                self.register.passed_over(&self.job.recorded_head(source, run), &source.path)
+            })
+            .collect()
+    }
+
     fn row(&mut self, rig: &Rig, row: RowView<'_>, written: &mut Vec<Written>) -> Result<(), WriteError> {
         if self.open.as_ref().is_none_or(|open| open.run() != row.run) {
             if let Some(before) = self.open.take() {
@@ -249,22 +277,13 @@ impl JobInProgress<'_> {
                     self.closed.push(before);
                 }
             }
-            let head = self.job.head(rig, row.run, self.options.date)?;
-            self.open = Some(RunWriter::begin(self.runtime, self.place, head, rig)?);
+            let (source, head) = self.job.head(rig, row.run, self.options.date)?;
+            let passed_over = self.register.passed_over(&head, &source.path);
+            self.open = Some(RunWriter::begin(head, rig, passed_over)?);
         }
         match &mut self.open {
             Some(open) => open.push(row),
             None => Ok(()),
         }
-    }
-}
-
-impl Source {
-    /// True if the run of a recording is there already. Of a table nobody knows its runs before it is read.
-    fn is_kept(&self, runtime: &Handle, place: &Place, job: &Job) -> bool {
-        self.run.as_ref().is_some_and(|run| {
-            let head = job.recorded_head(self, run);
-            runtime.block_on(run_writer::is_there(place, &head))
-        })
     }
 }

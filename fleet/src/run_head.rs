@@ -71,6 +71,11 @@ impl RunHead {
         of_metadata(file, &metadata(place, file).await?)
     }
 
+    /// True if its rows come from a recording.
+    pub(crate) fn is_recorded(&self) -> bool {
+        self.started_ns.is_some()
+    }
+
     /// True if a file with this head need not be written again in place of `known`.
     pub(crate) fn is_same_source(&self, known: &Self) -> bool {
         self.schema == known.schema

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs, io,
+    fs, io, iter,
     path::{Path, PathBuf},
 };
 
@@ -13,11 +13,12 @@ use tactus_schema::Rig;
 use super::{FailedFile, IngestError, JobError, run_writer::WriteError};
 use crate::{RunHead, run_head::SCHEMA};
 
-/// Files that are read together.
+/// Files that are read together: one table, or recordings that go on with each other's run.
 #[derive(Debug)]
 pub(super) struct Job {
-    /// One table, or recordings: each goes on with the run of the one before.
-    pub(super) sources: Vec<Source>,
+    first: Source,
+    /// Recordings: each goes on with the run of one before.
+    later: Vec<Source>,
 }
 
 /// A file to ingest.
@@ -54,7 +55,7 @@ pub(super) fn found(paths: &[PathBuf]) -> Result<(Vec<Job>, Vec<FailedFile>), In
     }
     let (mut jobs, doubles) = together(sources);
     failed.extend(doubles);
-    jobs.sort_by_key(|job| std::cmp::Reverse(job.sources.iter().map(|source| source.bytes).sum::<u64>()));
+    jobs.sort_by_key(|job| std::cmp::Reverse(job.bytes()));
     Ok((jobs, failed))
 }
 
@@ -98,7 +99,7 @@ fn together(sources: Vec<Source>) -> (Vec<Job>, Vec<FailedFile>) {
     let mut recordings: BTreeMap<String, Source> = BTreeMap::new();
     for source in sources {
         let Some(run) = &source.run else {
-            jobs.push(Job { sources: vec![source] });
+            jobs.push(Job::alone(source));
             continue;
         };
         if let Some(first) = recordings.get(&run.run_id) {
@@ -127,31 +128,52 @@ fn together(sources: Vec<Source>) -> (Vec<Job>, Vec<FailedFile>) {
             order.extend(next);
             at += 1;
         }
-        let sources: Vec<Source> = order.iter().filter_map(|id| recordings.remove(id)).collect();
-        jobs.push(Job { sources });
+        let mut sources = order.iter().filter_map(|id| recordings.remove(id));
+        jobs.extend(sources.next().map(|first| Job { first, later: sources.collect() }));
     }
     // What is left goes on with each other in a circle, which no service writes.
-    jobs.extend(recordings.into_values().map(|source| Job { sources: vec![source] }));
+    jobs.extend(recordings.into_values().map(Job::alone));
     (jobs, failed)
 }
 
 impl Job {
-    /// True if its rows come from a measurement table.
-    pub(super) fn is_table(&self) -> bool {
-        self.sources.iter().all(|source| source.run.is_none())
+    fn alone(source: Source) -> Self {
+        Self { first: source, later: Vec::new() }
     }
 
-    /// The head of a run whose first row has come.
-    pub(super) fn head(&self, rig: &Rig, run: &str, date: Option<Date>) -> Result<RunHead, WriteError> {
-        let recorded = self.sources.iter().find_map(|source| {
-            let metadata = source.run.as_ref().filter(|metadata| metadata.run_id == run)?;
-            Some(self.recorded_head(source, metadata))
-        });
-        if let Some(head) = recorded {
-            return Ok(head);
+    /// Its files, in the order in which they are read.
+    pub(super) fn sources(&self) -> impl Iterator<Item = &Source> {
+        iter::once(&self.first).chain(&self.later)
+    }
+
+    /// Size of its files.
+    pub(super) fn bytes(&self) -> u64 {
+        self.sources().map(|source| source.bytes).sum()
+    }
+
+    /// True if its rows come from a measurement table.
+    pub(super) fn is_table(&self) -> bool {
+        self.first.run.is_none()
+    }
+
+    /// Its recordings with their runs.
+    pub(super) fn recorded(&self) -> impl Iterator<Item = (&Source, &RunMetadata)> {
+        self.sources().filter_map(|source| Some((source, source.run.as_ref()?)))
+    }
+
+    /// The file and the head of a run whose first row has come.
+    pub(super) fn head(
+        &self,
+        rig: &Rig,
+        run: &str,
+        date: Option<Date>,
+    ) -> Result<(&Source, RunHead), WriteError> {
+        if let Some((source, metadata)) = self.recorded().find(|(_, metadata)| metadata.run_id == run) {
+            return Ok((source, self.recorded_head(source, metadata)));
         }
+        let table = &self.first;
         let date = date_of_id(run).or(date).ok_or_else(|| WriteError::NoDate { run: run.to_owned() })?;
-        Ok(RunHead {
+        let head = RunHead {
             schema: SCHEMA.to_owned(),
             run: run.to_owned(),
             rig: rig.name.clone(),
@@ -163,14 +185,15 @@ impl Job {
             who: None,
             continues: None,
             continued_by: None,
-            source_bytes: self.sources.iter().map(|source| source.bytes).sum(),
+            source_bytes: table.bytes,
             warnings: Vec::new(),
-        })
+        };
+        Ok((table, head))
     }
 
     /// The head of a recorded run.
     pub(super) fn recorded_head(&self, source: &Source, run: &RunMetadata) -> RunHead {
-        let goes_on_with = |other: &&RunMetadata| other.continues.as_ref() == Some(&run.run_id);
+        let goes_on_with = |(_, other): &(_, &RunMetadata)| other.continues.as_ref() == Some(&run.run_id);
         RunHead {
             schema: SCHEMA.to_owned(),
             run: run.run_id.clone(),
@@ -182,12 +205,7 @@ impl Job {
             script: Some(run.script.clone()),
             who: Some(run.who.clone()),
             continues: run.continues.clone(),
-            continued_by: self
-                .sources
-                .iter()
-                .filter_map(|source| source.run.as_ref())
-                .find(goes_on_with)
-                .map(|other| other.run_id.clone()),
+            continued_by: self.recorded().find(goes_on_with).map(|(_, other)| other.run_id.clone()),
             source_bytes: source.bytes,
             warnings: Vec::new(),
         }
@@ -196,7 +214,7 @@ impl Job {
     /// Its files, for a problem that one of them has.
     pub(super) fn failed(&self, error: &JobError) -> Vec<FailedFile> {
         let failed = |source: &Source| FailedFile { path: source.path.clone(), problem: error.to_string() };
-        self.sources.iter().map(failed).collect()
+        self.sources().map(failed).collect()
     }
 }
 

@@ -3,7 +3,7 @@
 use std::io::{self, Read as _, Seek as _, SeekFrom};
 
 use arrow::error::ArrowError;
-use object_store::{ObjectStoreExt as _, buffered::BufWriter};
+use object_store::buffered::BufWriter;
 use parquet::{
     arrow::ArrowWriter,
     basic::{Compression, ZstdLevel},
@@ -17,6 +17,7 @@ use tactus_schema::{
 use tempfile::SpooledTempFile;
 use tokio::{io::AsyncWriteExt as _, runtime::Handle};
 
+use super::FailedFile;
 use crate::{
     Place, RunHead,
     columns::{Rows, SCHEMA},
@@ -39,6 +40,8 @@ const PART_BYTES: usize = 8 << 20;
 pub(super) enum Written {
     /// It was there already.
     Kept,
+    /// It is not taken from this file.
+    Refused(FailedFile),
     /// It is there now.
     New { rows: u64, bytes: u64, warnings: Vec<String> },
 }
@@ -63,26 +66,20 @@ pub(super) struct RunWriter {
     head: RunHead,
     rows: Rows,
     rows_all: u64,
-    /// `None` if the run is there already: its rows are passed over.
-    file: Option<ArrowWriter<SpooledTempFile>>,
-}
-
-/// True if the fleet has the file of a run, made of the same source.
-pub(super) async fn is_there(place: &Place, head: &RunHead) -> bool {
-    let path = place.of_run(&head.rig, &head.date, &head.run);
-    let Ok(file) = place.store().head(&path).await else { return false };
-    // A file that is no longer readable is written again.
-    RunHead::read(place, &file).await.is_ok_and(|known| known.is_same_source(head))
+    /// `Err` has what becomes of a run whose rows are passed over.
+    file: Result<ArrowWriter<SpooledTempFile>, Written>,
 }
 
 impl RunWriter {
     pub(super) fn begin(
-        runtime: &Handle,
-        place: &Place,
         head: RunHead,
         rig: &Rig,
+        passed_over: Option<Written>,
     ) -> Result<Self, WriteError> {
-        let file = if runtime.block_on(is_there(place, &head)) { None } else { Some(begun(&head, rig)?) };
+        let file = match passed_over {
+            Some(written) => Err(written),
+            None => Ok(begun(&head, rig)?),
+        };
         Ok(Self { head, rows: Rows::new(), rows_all: 0, file })
     }
 
@@ -91,7 +88,7 @@ impl RunWriter {
     }
 
     pub(super) fn push(&mut self, row: RowView<'_>) -> Result<(), WriteError> {
-        if self.file.is_none() {
+        if self.file.is_err() {
             return Ok(());
         }
         self.rows.push(row);
@@ -100,7 +97,7 @@ impl RunWriter {
     }
 
     fn write_batch(&mut self) -> Result<(), WriteError> {
-        let Some(file) = &mut self.file else { return Ok(()) };
+        let Ok(file) = &mut self.file else { return Ok(()) };
         let batch = self.rows.take(&self.head).map_err(|source| of_arrow(&self.head.run, source))?;
         file.write(&batch).map_err(|source| WriteError::Parquet { run: self.head.run.clone(), source })
     }
@@ -113,8 +110,10 @@ impl RunWriter {
         warnings: Vec<String>,
     ) -> Result<Written, WriteError> {
         self.write_batch()?;
-        let Self { mut head, rows_all: rows, file: Some(mut file), .. } = self else {
-            return Ok(Written::Kept);
+        let Self { mut head, rows_all: rows, file, .. } = self;
+        let mut file = match file {
+            Ok(file) => file,
+            Err(written) => return Ok(written),
         };
         head.warnings.clone_from(&warnings);
         let run = head.run.clone();

@@ -1,9 +1,10 @@
 //! From recordings to one file per run: where it lies, what it says, what a kill leaves.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::{fs, num::NonZeroUsize, sync::Arc, thread};
 
 use object_store::{ObjectStoreExt as _, memory::InMemory};
+use serde_json::Value;
 use tactus_fleet::{IngestOptions, Place, ingest};
 use tactus_record::table;
 use url::Url;
@@ -135,6 +136,76 @@ fn a_table_is_ingested_run_by_run_and_needs_a_date_if_its_runs_have_none() {
         "{:?}",
         lab.files()
     );
+}
+
+/// Two tables, each with a run `press` of one rig, but not the same one.
+fn two_tables_of_one_run() -> Lab {
+    let lab = Lab::new();
+    for (table, presses) in [("mon/press.parquet", 1), ("tue/press.parquet", 2)] {
+        let recording = lab.record("left", "press", NOON_NS, presses);
+        lab.export(&[recording], table);
+        fs::remove_dir_all(lab.path("runs")).unwrap();
+    }
+    lab
+}
+
+/// Problems of files that were not ingested, or of runs of them, in order of their paths.
+fn failed(told: &Value) -> Vec<(String, String)> {
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    let failed = told["failed"].as_array().unwrap();
+    failed.iter().map(|failed| (text(&failed["path"]), text(&failed["problem"]))).collect()
+}
+
+#[test]
+fn of_two_tables_with_one_run_one_gives_it_and_the_other_is_named() {
+    let lab = two_tables_of_one_run();
+    let tables = ["mon/press.parquet", "tue/press.parquet"];
+    let args = ["--json", "ingest", tables[0], tables[1], "--to", "fleet", "--date", "2026-03-30"];
+    let said = lab.fleet(&args);
+    assert_eq!(said.code, Some(3), "{said:?}");
+    let told = said.json();
+    assert_eq!(told["runs_written"], 1);
+    let failed = failed(&told);
+    let [(path, problem)] = failed.as_slice() else { panic!("{failed:?}") };
+    let first = tables.into_iter().find(|table| table != path).unwrap();
+    assert!(problem.contains("\"press\" of rig left") && problem.contains(first), "{problem}");
+    let given = table::read(lab.path(first)).unwrap();
+    let written = table::read(lab.path("fleet").join(&lab.files()[0])).unwrap();
+    assert!(written.rows().eq(given.rows()));
+}
+
+#[test]
+fn the_other_runs_of_a_table_are_ingested() {
+    let lab = two_tables_of_one_run();
+    let [monday, other] = ["press", "other"].map(|run| lab.record("left", run, NOON_NS, 1));
+    lab.export(&[monday, other], "both.parquet");
+    fs::remove_dir_all(lab.path("mon")).unwrap();
+    let args = ["both.parquet", "tue/press.parquet", "--to", "fleet", "--date", "2026-03-30"];
+    let told = lab.fleet(&[&["--json", "ingest"][..], &args].concat()).json();
+    assert_eq!((&told["runs_written"], failed(&told).len()), (&2.into(), 1), "{told}");
+    assert_eq!(lab.files().len(), 2);
+}
+
+#[test]
+fn a_recording_is_replaced_by_no_table_of_its_run() {
+    let lab = Lab::new();
+    let run = "20260325-120000-image";
+    let recording = lab.record("left", run, NOON_NS, 1);
+    lab.export(&[recording], "table.parquet");
+    let file = format!("rig=left/date=2026-03-25/{run}.parquet");
+    let written = |files: &[&str]| {
+        let said = lab.fleet(&[&["--json", "ingest", "--to", "fleet"], files].concat());
+        assert_eq!(said.code, Some(3), "{said:?}");
+        let failed = failed(&said.json());
+        let [(path, problem)] = failed.as_slice() else { panic!("{failed:?}") };
+        assert_eq!(path, "table.parquet");
+        assert!(problem.contains("20260325-120000-image"), "{problem}");
+        fs::read(lab.path("fleet").join(&file)).unwrap()
+    };
+    let recorded = written(&["table.parquet", "runs"]);
+    assert!(written(&["table.parquet"]) == recorded);
+    let sql = "SELECT experiment FROM runs";
+    assert!(lab.fleet(&["query", sql]).out.contains("element-centres"));
 }
 
 #[test]

@@ -104,6 +104,13 @@ impl Lab {
         path
     }
 
+    /// Exports recordings as a measurement table of this name.
+    pub(crate) fn export(&self, recordings: &[PathBuf], table: &str) {
+        let table = self.path(table);
+        fs::create_dir_all(table.parent().unwrap()).unwrap();
+        tactus_record::export(recordings, table).unwrap();
+    }
+
     /// Runs the program in the lab's folder.
     pub(crate) fn fleet(&self, args: &[&str]) -> Said {
         let output = self.command(args).output().unwrap();

@@ -1,0 +1,87 @@
+//! Which file each run comes from: a rig has each run once.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use object_store::{ObjectMeta, path::Path as StorePath};
+use tokio::runtime::Handle;
+
+use super::{FailedFile, run_writer::Written};
+use crate::{Place, PlaceError, RunHead};
+
+/// The runs that the fleet has, and those that the files of this ingest give.
+pub(super) struct Register<'a> {
+    runtime: &'a Handle,
+    place: &'a Place,
+    /// Files of the fleet when the ingest began.
+    there: BTreeMap<StorePath, ObjectMeta>,
+    /// The file that gives each run.
+    given: Mutex<BTreeMap<Key, PathBuf>>,
+}
+
+/// A rig and a run of it.
+type Key = (String, String);
+
+/// Why a run is not taken from a file, although the file is in order.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error("its run {run:?} of rig {rig} is also in {}: of both files only that one is ingested", first.display())]
+    AlsoIn { run: String, rig: String, first: PathBuf },
+    #[error("its run {run:?} of rig {rig} is in the fleet as it was recorded, which a table does not replace")]
+    Recorded { run: String, rig: String },
+}
+
+impl<'a> Register<'a> {
+    /// # Errors
+    /// If the fleet cannot be read.
+    pub(super) fn of(runtime: &'a Handle, place: &'a Place) -> Result<Self, PlaceError> {
+        let files = runtime.block_on(place.files())?;
+        let there = files.into_iter().map(|file| (file.location.clone(), file)).collect();
+        Ok(Self { runtime, place, there, given: Mutex::default() })
+    }
+
+    /// From now on the run comes from this file, unless another one gave it before; the file that gives it.
+    pub(super) fn give(&self, rig: &str, run: &str, source: &Path) -> PathBuf {
+        let key = (rig.to_owned(), run.to_owned());
+        self.given().entry(key).or_insert_with(|| source.to_owned()).clone()
+    }
+
+    /// What becomes of a run without its rows being written; `None` if they are to be written.
+    pub(super) fn passed_over(&self, head: &RunHead, source: &Path) -> Option<Written> {
+        match self.needs_writing(head, source) {
+            Ok(true) => None,
+            Ok(false) => Some(Written::Kept),
+            Err(refusal) => {
+                let (path, problem) = (source.to_owned(), refusal.to_string());
+                Some(Written::Refused(FailedFile { path, problem }))
+            }
+        }
+    }
+
+    /// False if the fleet has the run from the same file.
+    fn needs_writing(&self, head: &RunHead, source: &Path) -> Result<bool, Refusal> {
+        let (run, rig) = (head.run.clone(), head.rig.clone());
+        let first = self.give(&rig, &run, source);
+        if first != source {
+            return Err(Refusal::AlsoIn { run, rig, first });
+        }
+        match self.known(head) {
+            Some(known) if known.is_recorded() && !head.is_recorded() => Err(Refusal::Recorded { run, rig }),
+            Some(known) => Ok(!known.is_same_source(head)),
+            None => Ok(true),
+        }
+    }
+
+    /// What the fleet's file of a run says. One that is no longer readable is written again.
+    fn known(&self, head: &RunHead) -> Option<RunHead> {
+        let file = self.there.get(&self.place.of_run(&head.rig, &head.date, &head.run))?;
+        self.runtime.block_on(RunHead::read(self.place, file)).ok()
+    }
+
+    fn given(&self) -> MutexGuard<'_, BTreeMap<Key, PathBuf>> {
+        self.given.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
