@@ -98,7 +98,7 @@ enum JobError {
 const SCHEMA: &str = "tactus.fleet.ingest/1";
 
 /// Writes the runs of recordings and measurement tables into a fleet. Folders are searched for recordings. A run that is there already, made
-/// of a file of the same size, is kept.
+/// of the same file by size and checksum, is kept.
 ///
 /// A rig has each run once. Of two files with one run, one gives it; a table never replaces what was recorded. The other file is among
 /// [`Ingested::failed`], with the runs that were not taken from it.

@@ -15,10 +15,10 @@ use crate::{Place, PlaceError};
 const METADATA_KEY: &str = "tactus.run";
 
 /// Form of the head.
-pub(crate) const SCHEMA: &str = "tactus.fleet.run/1";
+pub(crate) const SCHEMA: &str = "tactus.fleet.run/2";
 
-/// Bytes at the end of a file that are read first: they hold the metadata of most.
-const FOOTER_BYTES: u64 = 64 * 1024;
+/// Bytes at the end of a file that tell it from others of its size, and hold the metadata of most.
+pub(crate) const END_BYTES: u64 = 64 * 1024;
 
 /// What a file says of its run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,6 +47,10 @@ pub struct RunHead {
     pub continued_by: Option<String>,
     /// Size of the file that the rows come from. A file of another size is read anew.
     pub source_bytes: u64,
+    /// CRC-32 of its last 64 KiB. A file of another one is read anew, and so is one of a head of form 1, which has none: equal sizes alone
+    /// do not make two files one.
+    #[serde(default)]
+    pub source_end_crc32: Option<u32>,
     /// What readers of the rows must know, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -80,6 +84,7 @@ impl RunHead {
     pub(crate) fn is_same_source(&self, known: &Self) -> bool {
         self.schema == known.schema
             && self.source_bytes == known.source_bytes
+            && self.source_end_crc32 == known.source_end_crc32
             && self.continued_by == known.continued_by
     }
 }
@@ -130,7 +135,7 @@ fn value<'a>(file: &ObjectMeta, metadata: &'a ParquetMetaData, key: &str) -> Res
 }
 
 async fn metadata(place: &Place, file: &ObjectMeta) -> Result<ParquetMetaData, HeadError> {
-    let mut wanted = FOOTER_BYTES.min(file.size);
+    let mut wanted = END_BYTES.min(file.size);
     loop {
         let end = place.store().get_range(&file.location, file.size - wanted..file.size);
         let end = end.await.map_err(|source| place.refused(source))?;

@@ -2,7 +2,9 @@
 
 use std::{
     collections::BTreeMap,
-    fs, io, iter,
+    fs::{self, File},
+    io::{self, Read as _, Seek as _, SeekFrom},
+    iter,
     path::{Path, PathBuf},
 };
 
@@ -11,7 +13,10 @@ use tactus_record::{Entry, RecordError, RunMetadata};
 use tactus_schema::Rig;
 
 use super::{FailedFile, IngestError, JobError, run_writer::WriteError};
-use crate::{RunHead, run_head::SCHEMA};
+use crate::{
+    RunHead,
+    run_head::{END_BYTES, SCHEMA},
+};
 
 /// Files that are read together: one table, or recordings that go on with each other's run.
 #[derive(Debug)]
@@ -26,6 +31,8 @@ pub(super) struct Job {
 pub(super) struct Source {
     pub(super) path: PathBuf,
     pub(super) bytes: u64,
+    /// CRC-32 of its last 64 KiB.
+    end_crc32: u32,
     /// The run of a recording; `None` of a table.
     pub(super) run: Option<RunMetadata>,
 }
@@ -75,21 +82,32 @@ fn search(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
 
 fn source(path: &Path) -> Result<Source, RecordError> {
     let io_error = |source| RecordError::Io { action: "read", path: path.to_owned(), source };
-    let bytes = fs::metadata(path).map_err(io_error)?.len();
+    let (bytes, end_crc32) = size_and_end(path).map_err(io_error)?;
+    let source = |run| Source { path: path.to_owned(), bytes, end_crc32, run };
     let entries = match tactus_record::read(path) {
         Ok(entries) => entries,
         // A table, or neither: whoever reads its rows says so.
-        Err(RecordError::NotMcap { .. }) => return Ok(Source { path: path.to_owned(), bytes, run: None }),
+        Err(RecordError::NotMcap { .. }) => return Ok(source(None)),
         Err(error) => return Err(error),
     };
     for entry in entries {
         match entry.map_err(io_error)? {
-            Entry::Run(run) => return Ok(Source { path: path.to_owned(), bytes, run: Some(run) }),
+            Entry::Run(run) => return Ok(source(Some(run))),
             Entry::Attachment(_) => {}
             Entry::Message { .. } => break,
         }
     }
     Err(RecordError::NoRun { path: path.to_owned() })
+}
+
+/// Size of a file, and CRC-32 of its last 64 KiB.
+fn size_and_end(path: &Path) -> io::Result<(u64, u32)> {
+    let mut file = File::open(path)?;
+    let bytes = file.metadata()?.len();
+    file.seek(SeekFrom::Start(bytes.saturating_sub(END_BYTES)))?;
+    let mut end = Vec::new();
+    file.take(END_BYTES).read_to_end(&mut end)?;
+    Ok((bytes, crc32fast::hash(&end)))
 }
 
 /// Joins recordings that go on with each other. Of two recordings of one run the second is left out.
@@ -186,6 +204,7 @@ impl Job {
             continues: None,
             continued_by: None,
             source_bytes: table.bytes,
+            source_end_crc32: Some(table.end_crc32),
             warnings: Vec::new(),
         };
         Ok((table, head))
@@ -207,6 +226,7 @@ impl Job {
             continues: run.continues.clone(),
             continued_by: self.recorded().find(goes_on_with).map(|(_, other)| other.run_id.clone()),
             source_bytes: source.bytes,
+            source_end_crc32: Some(source.end_crc32),
             warnings: Vec::new(),
         }
     }

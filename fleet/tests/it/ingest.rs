@@ -1,7 +1,7 @@
 //! From recordings to one file per run: where it lies, what it says, what a kill leaves.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
-use std::{fs, num::NonZeroUsize, sync::Arc, thread};
+use std::{fs, num::NonZeroUsize, path::Path, sync::Arc, thread};
 
 use object_store::{ObjectStoreExt as _, memory::InMemory};
 use serde_json::Value;
@@ -58,6 +58,38 @@ fn a_run_that_is_there_is_kept_and_a_recording_of_another_size_is_read_anew() {
 
 fn modified(lab: &Lab, file: &str) -> std::time::SystemTime {
     fs::metadata(lab.path("fleet").join(file)).unwrap().modified().unwrap()
+}
+
+#[test]
+fn a_corrected_table_of_the_same_size_is_read_anew() {
+    let lab = Lab::with_three_runs();
+    lab.export(&[lab.path("runs/20260325-120000-image/recording.mcap")], "table.parquet");
+    let ingest = || lab.fleet(&["--json", "ingest", "table.parquet", "--to", "fleet"]).json();
+    let baseline_counts = || {
+        let table = table::read(lab.path("fleet").join(&lab.files()[0])).unwrap();
+        table.head().rig.baseline_counts.clone()
+    };
+    assert_eq!(ingest()["runs_written"], 1);
+    let before = baseline_counts();
+    assert_eq!(ingest()["runs_kept"], 1);
+
+    let mut rig = table::read(lab.path("table.parquet")).unwrap().head().rig.clone();
+    let old = rig.to_json();
+    for counts in &mut rig.baseline_counts {
+        *counts += 1.0;
+    }
+    replace(&lab.path("table.parquet"), &old, &rig.to_json());
+    assert_eq!(ingest()["runs_written"], 1);
+    assert_ne!(baseline_counts(), before);
+}
+
+/// Replaces a text of a file by another one of the same length.
+fn replace(path: &Path, old: &str, new: &str) {
+    assert_eq!(old.len(), new.len());
+    let mut bytes = fs::read(path).unwrap();
+    let at = bytes.windows(old.len()).position(|window| window == old.as_bytes()).unwrap();
+    bytes[at..at + old.len()].copy_from_slice(new.as_bytes());
+    fs::write(path, bytes).unwrap();
 }
 
 #[test]
