@@ -16,8 +16,8 @@ use crate::{Place, PlaceError, RunHead};
 pub(super) struct Register<'a> {
     runtime: &'a Handle,
     place: &'a Place,
-    /// Files of the fleet when the ingest began.
-    there: BTreeMap<StorePath, ObjectMeta>,
+    /// Files of the fleet when the ingest began, of each run by date. An older program may have written one under several dates.
+    there: BTreeMap<[String; 2], BTreeMap<String, ObjectMeta>>,
     /// The file that gives each run.
     given: Mutex<BTreeMap<Key, PathBuf>>,
 }
@@ -32,6 +32,10 @@ enum Refusal {
     AlsoIn { run: String, rig: String, first: PathBuf },
     #[error("its run {run:?} of rig {rig} is in the fleet as it was recorded, which a table does not replace")]
     Recorded { run: String, rig: String },
+    #[error(
+        "its run {run:?} of rig {rig} is in the fleet under {there}, and would be there a second time under {date}. If it is the same run, give --date {there}; else give it another name"
+    )]
+    OtherDate { run: String, rig: String, there: String, date: String },
 }
 
 impl<'a> Register<'a> {
@@ -39,7 +43,12 @@ impl<'a> Register<'a> {
     /// If the fleet cannot be read.
     pub(super) fn of(runtime: &'a Handle, place: &'a Place) -> Result<Self, PlaceError> {
         let files = runtime.block_on(place.files())?;
-        let there = files.into_iter().map(|file| (file.location.clone(), file)).collect();
+        let mut there: BTreeMap<_, BTreeMap<_, _>> = BTreeMap::new();
+        for file in files {
+            if let Some(([rig, run], date)) = parts(place, &file.location) {
+                there.entry([rig, run]).or_default().insert(date, file);
+            }
+        }
         Ok(Self { runtime, place, there, given: Mutex::default() })
     }
 
@@ -68,20 +77,39 @@ impl<'a> Register<'a> {
         if first != source {
             return Err(Refusal::AlsoIn { run, rig, first });
         }
-        match self.known(head) {
-            Some(known) if known.is_recorded() && !head.is_recorded() => Err(Refusal::Recorded { run, rig }),
-            Some(known) => Ok(!known.is_same_source(head)),
-            None => Ok(true),
+        let Some(file) = self.file(head)? else { return Ok(true) };
+        // A file that is no longer readable is written again.
+        let Ok(known) = self.runtime.block_on(RunHead::read(self.place, file)) else { return Ok(true) };
+        if known.is_recorded() && !head.is_recorded() {
+            return Err(Refusal::Recorded { run, rig });
         }
+        Ok(!known.is_same_source(head))
     }
 
-    /// What the fleet's file of a run says. One that is no longer readable is written again.
-    fn known(&self, head: &RunHead) -> Option<RunHead> {
-        let file = self.there.get(&self.place.of_run(&head.rig, &head.date, &head.run))?;
-        self.runtime.block_on(RunHead::read(self.place, file)).ok()
+    /// The fleet's file of a run, which must not be under another date only.
+    fn file(&self, head: &RunHead) -> Result<Option<&ObjectMeta>, Refusal> {
+        let path = self.place.of_run(&head.rig, &head.date, &head.run);
+        let Some((key, date)) = parts(self.place, &path) else { return Ok(None) };
+        let Some(dates) = self.there.get(&key) else { return Ok(None) };
+        match (dates.get(&date), dates.keys().next()) {
+            (None, Some(there)) => Err(Refusal::OtherDate {
+                run: head.run.clone(),
+                rig: head.rig.clone(),
+                there: there.clone(),
+                date,
+            }),
+            (file, _) => Ok(file),
+        }
     }
 
     fn given(&self) -> MutexGuard<'_, BTreeMap<Key, PathBuf>> {
         self.given.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Rig and run of a file in the fleet, as its path has them, and the date.
+fn parts(place: &Place, path: &StorePath) -> Option<([String; 2], String)> {
+    let [rig, date, run] = <[String; 3]>::try_from(place.in_fleet(path)).ok()?;
+    let date = date.strip_prefix("date=")?.to_owned();
+    Some(([rig, run], date))
 }

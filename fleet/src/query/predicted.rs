@@ -52,8 +52,8 @@ impl TableFunctionImpl for Predicted {
         let of_runs = |column: &str| Expr::Column(Column::new(Some("runs"), column));
         let frames = LogicalPlanBuilder::scan("frames", provider_as_source(Arc::clone(&self.frames)), None)?;
         let runs = LogicalPlanBuilder::scan("runs", provider_as_source(Arc::clone(&self.runs)), None)?
-            .project([of_runs("rig"), of_runs("run"), of_runs("description")])?;
-        let keys = |table: &str| ["rig", "run"].map(|key| Column::new(Some(table), key)).to_vec();
+            .project(["rig", "date", "run", "description"].map(of_runs))?;
+        let keys = |table: &str| ["rig", "date", "run"].map(|key| Column::new(Some(table), key)).to_vec();
         let columns = self.frames.schema();
         let columns = columns.fields().iter().map(|column| of_frames(column.name()));
         let tip = ["indenter", "x_mm", "y_mm", "z_mm", "covering_mm"].map(of_frames);

@@ -241,6 +241,20 @@ fn a_recording_is_replaced_by_no_table_of_its_run() {
 }
 
 #[test]
+fn a_run_does_not_stand_under_a_second_date() {
+    let lab = two_tables_of_one_run();
+    let ingest = |date| lab.fleet(&["ingest", "mon/press.parquet", "--to", "fleet", "--date", date]);
+    assert_eq!(ingest("2026-03-30").code, Some(0));
+    let said = ingest("2026-03-31");
+    assert_eq!(said.code, Some(3), "{said:?}");
+    for told in ["mon/press.parquet", "under 2026-03-30", "under 2026-03-31"] {
+        assert!(said.out.contains(told), "{said:?}");
+    }
+    assert_eq!(lab.files(), ["rig=left/date=2026-03-30/press.parquet"]);
+    assert_eq!(ingest("2026-03-30").code, Some(0));
+}
+
+#[test]
 fn any_object_store_holds_a_fleet() {
     let lab = Lab::with_three_runs();
     let runtime = tokio::runtime::Runtime::new().unwrap();

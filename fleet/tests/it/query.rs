@@ -181,6 +181,22 @@ fn residuals_are_the_counts_less_what_the_model_gives() {
     }
 }
 
+#[test]
+fn a_run_that_an_older_fleet_has_under_two_dates_is_predicted_once_a_frame() {
+    let lab = Lab::new();
+    let recording = lab.record("left", "press", NOON_NS, 1);
+    lab.export(&[recording], "press.parquet");
+    for (fleet, date) in [("fleet", "2026-03-30"), ("second", "2026-03-31")] {
+        let said = lab.fleet(&["ingest", "press.parquet", "--to", fleet, "--date", date]);
+        assert_eq!(said.code, Some(0), "{said:?}");
+    }
+    let second = "rig=left/date=2026-03-31";
+    fs::rename(lab.path("second").join(second), lab.path("fleet").join(second)).unwrap();
+    fs::write(lab.path("model.toml"), MODEL).unwrap();
+    let number = |table: &str| ask(&lab, &format!("SELECT count(*) AS frames FROM {table}"));
+    assert_eq!(number("predicted('model.toml')"), number("frames"));
+}
+
 /// An effect in a model file: the surface stands higher by 0.1 mm.
 const OFFSET: &str = "\n[[effect]]\nname = \"surface-offset\"\nparameters = { offset_mm = 0.1 }\n";
 
