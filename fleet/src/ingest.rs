@@ -143,6 +143,7 @@ pub fn ingest(
         shared.take(job, done, progress);
     });
     let mut ingested = shared.ingested.into_inner().unwrap_or_else(PoisonError::into_inner);
+    ingested.warnings.extend(register.warnings()?);
     ingested.warnings.sort();
     ingested.failed.sort_by(|one, other| one.path.cmp(&other.path));
     Ok(ingested)

@@ -9,6 +9,7 @@
 //! | `place` | where a fleet is: a folder or an address, and its object store |
 //! | `columns` | the columns of a file, and rows as Arrow batches |
 //! | `run_head` | what a file says of its run, in its metadata |
+//! | `twice` | frames that a fleet has twice, in two of its runs |
 //! | `ingest` | from recordings to files |
 //! | `cluster` | a query on several machines, with the feature of that name |
 //! | `query` | SQL over all runs |
@@ -26,6 +27,7 @@ mod place;
 mod query;
 mod run_head;
 mod survey;
+mod twice;
 
 pub use cli::main;
 pub use ingest::{FailedFile, IngestError, Ingested, Options as IngestOptions, ingest};

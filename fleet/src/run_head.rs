@@ -55,6 +55,9 @@ pub struct RunHead {
     pub warnings: Vec<String>,
 }
 
+/// How many files are asked at a time.
+const AT_A_TIME: usize = 32;
+
 /// Why a file is not that of a run.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum HeadError {
@@ -75,17 +78,22 @@ impl RunHead {
         of_metadata(file, &metadata(place, file).await?)
     }
 
+    /// What these files say, in their order. Those that are not readable are left out.
+    pub(crate) async fn readable(place: &Place, files: Vec<ObjectMeta>) -> Vec<Self> {
+        let reads = stream::iter(files).map(async |file| Self::read(place, &file).await.ok());
+        reads.buffered(AT_A_TIME).filter_map(std::future::ready).collect().await
+    }
+
     /// True if its rows come from a recording.
     pub(crate) fn is_recorded(&self) -> bool {
         self.started_ns.is_some()
     }
 
-    /// True if a file with this head need not be written again in place of `known`.
-    pub(crate) fn is_same_source(&self, known: &Self) -> bool {
-        self.schema == known.schema
-            && self.source_bytes == known.source_bytes
-            && self.source_end_crc32 == known.source_end_crc32
-            && self.continued_by == known.continued_by
+    /// True if the rows of both come from the same file. It may have been cut in one where another run goes on.
+    pub(crate) fn is_same_source(&self, other: &Self) -> bool {
+        self.schema == other.schema
+            && self.source_bytes == other.source_bytes
+            && self.source_end_crc32 == other.source_end_crc32
     }
 }
 
@@ -100,14 +108,11 @@ pub(crate) struct Described {
 }
 
 impl Described {
-    /// How many files are asked at a time.
-    const AT_A_TIME: usize = 32;
-
     /// What all files of a fleet say, in order of their paths.
     pub(crate) async fn all(place: &Place) -> Result<Vec<Self>, HeadError> {
         let files = stream::iter(place.files().await?);
         let reads = files.map(async |file| Self::read(place, &file).await);
-        reads.buffered(Self::AT_A_TIME).try_collect().await
+        reads.buffered(AT_A_TIME).try_collect().await
     }
 
     /// What a file says; its rows are not read.

@@ -1,7 +1,7 @@
 //! Which file each run comes from: a rig has each run once.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
     sync::{Mutex, MutexGuard, PoisonError},
 };
@@ -10,7 +10,7 @@ use object_store::{ObjectMeta, path::Path as StorePath};
 use tokio::runtime::Handle;
 
 use super::{FailedFile, run_writer::Written};
-use crate::{Place, PlaceError, RunHead};
+use crate::{Place, PlaceError, RunHead, twice::not_cut};
 
 /// The runs that the fleet has, and those that the files of this ingest give.
 pub(super) struct Register<'a> {
@@ -33,7 +33,11 @@ enum Refusal {
     #[error("its run {run:?} of rig {rig} is in the fleet as it was recorded, which a table does not replace")]
     Recorded { run: String, rig: String },
     #[error(
-        "its run {run:?} of rig {rig} is in the fleet under {there}, and would be there a second time under {date}. If it is the same run, give --date {there}; else give it another name"
+        "its run {run:?} of rig {rig} is in the fleet up to the presses that run {by:?} did again: give it together with the recording of that run"
+    )]
+    Cut { run: String, rig: String, by: String },
+    #[error(
+        "its run {run:?} of rig {rig} is in the fleet under {there}, and would be there a second time under {date}. If it is the same run, give --date {there} or delete that file first; else give it another name"
     )]
     OtherDate { run: String, rig: String, there: String, date: String },
 }
@@ -83,7 +87,40 @@ impl<'a> Register<'a> {
         if known.is_recorded() && !head.is_recorded() {
             return Err(Refusal::Recorded { run, rig });
         }
-        Ok(!known.is_same_source(head))
+        match (known.is_same_source(head), &known.continued_by, &head.continued_by) {
+            (true, _, None) => Ok(false),
+            (true, known, given) => Ok(known != given),
+            (false, Some(by), None) => Err(Refusal::Cut { run, rig, by: by.clone() }),
+            (false, _, _) => Ok(true),
+        }
+    }
+
+    /// What readers of the runs of this ingest must know, a sentence each, now that all are written.
+    pub(super) fn warnings(&self) -> Result<Vec<String>, PlaceError> {
+        let given = self.given();
+        let is_given = |head: &RunHead| given.contains_key(&(head.rig.clone(), head.run.clone()));
+        let heads = self.heads_of_rigs(given.keys().map(|(rig, _)| rig.as_str()))?;
+        let not_cut = not_cut(&heads).filter(|(earlier, later)| is_given(earlier) || is_given(later));
+        let in_words = |(earlier, later): (&RunHead, &RunHead)| {
+            format!(
+                "run {} of rig {} goes on with run {}, which is in the fleet with the presses that were done again: ingest the recordings of both together",
+                later.run, later.rig, earlier.run
+            )
+        };
+        Ok(not_cut.map(in_words).collect())
+    }
+
+    /// What the fleet's files of these rigs say now.
+    fn heads_of_rigs<'r>(&self, rigs: impl Iterator<Item = &'r str>) -> Result<Vec<RunHead>, PlaceError> {
+        let folders: BTreeSet<_> = rigs.filter_map(|rig| folder_of_rig(self.place, rig)).collect();
+        if folders.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut files = self.runtime.block_on(self.place.files())?;
+        files.retain(|file| {
+            self.place.in_fleet(&file.location).first().is_some_and(|folder| folders.contains(folder))
+        });
+        Ok(self.runtime.block_on(RunHead::readable(self.place, files)))
     }
 
     /// The fleet's file of a run, which must not be under another date only.
@@ -105,6 +142,11 @@ impl<'a> Register<'a> {
     fn given(&self) -> MutexGuard<'_, BTreeMap<Key, PathBuf>> {
         self.given.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Name of the folder that a rig's files are in.
+fn folder_of_rig(place: &Place, rig: &str) -> Option<String> {
+    place.in_fleet(&place.of_run(rig, "", "")).into_iter().next()
 }
 
 /// Rig and run of a file in the fleet, as its path has them, and the date.

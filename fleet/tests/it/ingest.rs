@@ -254,6 +254,59 @@ fn a_run_does_not_stand_under_a_second_date() {
     assert_eq!(ingest("2026-03-30").code, Some(0));
 }
 
+/// A run of three presses, and one that goes on with it and does the last two again.
+fn continued() -> (Lab, [String; 2]) {
+    let lab = Lab::new();
+    let runs = ["20260325-120000-image", "20260325-130000-image"];
+    lab.record("left", runs[0], NOON_NS, 3);
+    lab.record_continued("left", runs[1], NOON_NS + 3_600_000_000_000, runs[0]);
+    (lab, runs.map(|run| format!("runs/{run}")))
+}
+
+/// Index of the last press of the first run in the fleet.
+fn last_press(lab: &Lab) -> Option<i32> {
+    let table = table::read(lab.path("fleet").join(&lab.files()[0])).unwrap();
+    table.rows().map(|row| row.press).max()
+}
+
+#[test]
+fn a_run_that_was_cut_where_another_goes_on_is_not_replaced_by_the_whole() {
+    let (lab, [first, second]) = continued();
+    let ingest = |runs: &[&str]| lab.fleet(&[&["ingest", "--to", "fleet"], runs].concat());
+    assert_eq!(ingest(&[&first, &second]).code, Some(0));
+    assert_eq!(last_press(&lab), Some(0));
+    let said = ingest(&[&first]);
+    assert_eq!((said.code, last_press(&lab)), (Some(0), Some(0)), "{said:?}");
+
+    // Recovered, or copied when more of it was there.
+    fs::remove_dir_all(lab.path(&first)).unwrap();
+    lab.record("left", "20260325-120000-image", NOON_NS, 4);
+    let said = ingest(&[&first]);
+    assert_eq!((said.code, last_press(&lab)), (Some(3), Some(0)), "{said:?}");
+    assert!(said.out.contains("together with") && said.out.contains("20260325-130000-image"), "{said:?}");
+    assert_eq!(ingest(&[&first, &second]).code, Some(0));
+    assert_eq!(last_press(&lab), Some(0));
+}
+
+#[test]
+fn a_continuation_beside_the_whole_of_its_run_is_told_in_either_order() {
+    for is_first_first in [true, false] {
+        let (lab, mut runs) = continued();
+        if !is_first_first {
+            runs.reverse();
+        }
+        let ingest = |runs: &[&str]| lab.fleet(&[&["ingest", "--to", "fleet"], runs].concat());
+        assert_eq!(ingest(&[&runs[0]]).code, Some(0));
+        for _ in 0..2 {
+            let said = ingest(&[&runs[1]]);
+            assert_eq!(said.code, Some(3), "{said:?}");
+            assert!(said.out.contains("ingest the recordings of both together"), "{said:?}");
+        }
+        assert_eq!(ingest(&[&runs[0], &runs[1]]).code, Some(0));
+        assert_eq!(last_press(&lab), Some(0));
+    }
+}
+
 #[test]
 fn any_object_store_holds_a_fleet() {
     let lab = Lab::with_three_runs();

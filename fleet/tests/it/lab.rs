@@ -11,7 +11,10 @@ use std::{
 
 use serde_json::Value;
 use tactus_record::{Header, Recording, Script};
-use tactus_schema::WallTime;
+use tactus_schema::{
+    WallTime,
+    pb::{self, run_event::Event},
+};
 use tempfile::TempDir;
 
 use crate::synthetic::{Fed, Plan};
@@ -23,6 +26,18 @@ pub(crate) const DAY_NS: i64 = 86_400_000_000_000;
 /// A folder with recordings.
 pub(crate) struct Lab {
     folder: TempDir,
+}
+
+/// What a recording says of its run.
+struct Told {
+    experiment: &'static str,
+    taken_over: Option<pb::TakenOver>,
+}
+
+impl Default for Told {
+    fn default() -> Self {
+        Self { experiment: "element-centres", taken_over: None }
+    }
 }
 
 /// What a program said.
@@ -69,8 +84,19 @@ impl Lab {
         self.record_plan(rig, plan, started_ns, gain)
     }
 
+    /// Records a run that goes on with another one, whose presses from 1 on it does again.
+    pub(crate) fn record_continued(&self, rig: &str, run_id: &str, started_ns: i64, earlier: &str) -> PathBuf {
+        let plan = Plan { run_id: run_id.to_owned(), ..Plan::short(2) };
+        let taken_over = pb::TakenOver { run_id: earlier.to_owned(), first_press: 1, ..Default::default() };
+        self.record_told(rig, plan, started_ns, 1.0, Told { taken_over: Some(taken_over), ..Told::default() })
+    }
+
     /// Records a run as planned, with a sensor whose rises are multiplied.
     pub(crate) fn record_plan(&self, rig: &str, plan: Plan, started_ns: i64, gain: f64) -> PathBuf {
+        self.record_told(rig, plan, started_ns, gain, Told::default())
+    }
+
+    fn record_told(&self, rig: &str, plan: Plan, started_ns: i64, gain: f64, told: Told) -> PathBuf {
         let mut run = plan.make();
         let run_id = &run.plan.run_id.clone();
         rig.clone_into(&mut run.rig.name);
@@ -79,7 +105,7 @@ impl Lab {
         let versions = BTreeMap::from([("tactus".to_owned(), "0.1.0".to_owned())]);
         let header = Header {
             run_id,
-            experiment: "element-centres",
+            experiment: told.experiment,
             who: "ada",
             rig: &run.rig,
             rig_toml: None,
@@ -89,13 +115,16 @@ impl Lab {
             parameters_json: "{}",
             started: WallTime::from_ns(started_ns),
             simulated: true,
-            continues: None,
+            continues: told.taken_over.as_ref().map(|taken| taken.run_id.as_str()),
         };
         let mut recording = Recording::create(&path, &header).unwrap();
         for fed in &mut run.fed {
             match fed {
                 Fed::Frame(frame) => frame.counts = amplified(&frame.counts, gain),
                 Fed::Info(info, _) => rig.clone_into(&mut info.rig),
+                Fed::Event(pb::RunEvent { event: Some(Event::Started(started)), .. }) => {
+                    started.taken_over.clone_from(&told.taken_over);
+                }
                 Fed::Stage(_) | Fed::Event(_) => {}
             }
             fed.write(&mut recording).unwrap();
