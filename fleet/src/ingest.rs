@@ -60,7 +60,7 @@ pub struct Ingested {
     pub failed: Vec<FailedFile>,
 }
 
-/// A file that could not be ingested, or a run of it.
+/// A file or a folder that could not be ingested, or a run of a file.
 #[derive(Debug, Clone, Serialize)]
 pub struct FailedFile {
     /// The file.
@@ -97,7 +97,7 @@ enum JobError {
 
 const SCHEMA: &str = "tactus.fleet.ingest/1";
 
-/// Writes the runs of recordings and measurement tables into a fleet. Folders are searched for recordings. A run that is there already, made
+/// Writes the runs of recordings and measurement tables into a fleet. Folders are searched for recordings, through links as well. A run that is there already, made
 /// of the same file by size and checksum, is kept.
 ///
 /// A rig has each run once. Of two files with one run, one gives it; a table never replaces what was recorded. The other file is among
@@ -106,7 +106,8 @@ const SCHEMA: &str = "tactus.fleet.ingest/1";
 /// Recordings that go on with another's run are read with it, if both are given: presses that were done again are left out.
 ///
 /// # Errors
-/// If a path or the fleet cannot be read, or there is no recording at all. A file that cannot be ingested stops no other: [`Ingested::failed`] lists it.
+/// If a path or the fleet cannot be read, or there is no recording at all. A file or folder that cannot be read stops no other:
+/// [`Ingested::failed`] lists it.
 pub fn ingest(
     runtime: &Handle,
     paths: &[PathBuf],

@@ -1,10 +1,11 @@
 //! The files to ingest, and which of them go together.
 
 use std::{
-    collections::BTreeMap,
-    fs::{self, File},
+    collections::{BTreeMap, BTreeSet},
+    fs::{self, File, Metadata},
     io::{self, Read as _, Seek as _, SeekFrom},
     iter,
+    os::unix::fs::MetadataExt as _,
     path::{Path, PathBuf},
 };
 
@@ -39,21 +40,17 @@ pub(super) struct Source {
 
 /// The jobs, the largest first, so that no thread ends with a long one alone; and the files that are not readable.
 pub(super) fn found(paths: &[PathBuf]) -> Result<(Vec<Job>, Vec<FailedFile>), IngestError> {
-    let mut files = Vec::new();
+    let mut search = Search::default();
     for path in paths {
         let kind = fs::metadata(path).map_err(|source| IngestError::Path { path: path.clone(), source })?;
-        if kind.is_dir() {
-            search(path, &mut files).map_err(|source| IngestError::Path { path: path.clone(), source })?;
-        } else {
-            files.push(path.clone());
-        }
+        search.take(path.clone(), &kind, true);
     }
+    let Search { mut files, mut failed, .. } = search;
     files.sort();
-    files.dedup();
-    if files.is_empty() {
+    if files.is_empty() && failed.is_empty() {
         return Err(IngestError::Nothing { paths: paths.to_owned() });
     }
-    let (mut sources, mut failed): (Vec<Source>, Vec<FailedFile>) = (Vec::new(), Vec::new());
+    let mut sources = Vec::new();
     for path in files {
         match source(&path) {
             Ok(source) => sources.push(source),
@@ -66,18 +63,48 @@ pub(super) fn found(paths: &[PathBuf]) -> Result<(Vec<Job>, Vec<FailedFile>), In
     Ok((jobs, failed))
 }
 
-/// Adds the recordings in a folder and in the folders in it.
-fn search(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
-    for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        let path = entry.path();
-        if entry.file_type()?.is_dir() {
-            search(&path, files)?;
-        } else if path.extension().is_some_and(|extension| extension == "mcap") {
-            files.push(path);
+/// A search for files, through links as well. What several paths lead to is found once.
+#[derive(Default)]
+struct Search {
+    /// Device and inode of each file and folder that was seen.
+    seen: BTreeSet<(u64, u64)>,
+    files: Vec<PathBuf>,
+    failed: Vec<FailedFile>,
+}
+
+impl Search {
+    /// Adds a file if it is wanted; of a folder the recordings in it and in the folders in it.
+    fn take(&mut self, path: PathBuf, kind: &Metadata, is_wanted: bool) {
+        if (!kind.is_dir() && !is_wanted) || !self.seen.insert((kind.dev(), kind.ino())) {
+            return;
+        }
+        if !kind.is_dir() {
+            self.files.push(path);
+        } else if let Err(error) = self.folder(&path) {
+            self.fail(path, &error);
         }
     }
-    Ok(())
+
+    fn folder(&mut self, folder: &Path) -> io::Result<()> {
+        let mut paths = Vec::new();
+        for entry in fs::read_dir(folder)? {
+            paths.push(entry?.path());
+        }
+        // So that it does not depend on the file system which of several paths finds a file.
+        paths.sort();
+        for path in paths {
+            let is_recording = path.extension().is_some_and(|extension| extension == "mcap");
+            match fs::metadata(&path) {
+                Ok(kind) => self.take(path, &kind, is_recording),
+                Err(error) => self.fail(path, &error),
+            }
+        }
+        Ok(())
+    }
+
+    fn fail(&mut self, path: PathBuf, error: &io::Error) {
+        self.failed.push(FailedFile { path, problem: error.to_string() });
+    }
 }
 
 fn source(path: &Path) -> Result<Source, RecordError> {

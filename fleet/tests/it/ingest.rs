@@ -1,7 +1,14 @@
 //! From recordings to one file per run: where it lies, what it says, what a kill leaves.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
-use std::{fs, num::NonZeroUsize, path::Path, sync::Arc, thread};
+use std::{
+    fs::{self, Permissions},
+    num::NonZeroUsize,
+    os::unix::fs::{PermissionsExt as _, symlink},
+    path::Path,
+    sync::Arc,
+    thread,
+};
 
 use object_store::{ObjectStoreExt as _, memory::InMemory};
 use serde_json::Value;
@@ -143,6 +150,38 @@ fn files_that_cannot_be_ingested_stop_no_other() {
     let said = lab.fleet(&["ingest", "nowhere", "--to", "fleet"]);
     assert_eq!(said.code, Some(1));
     assert!(said.err.contains("nowhere"), "{said:?}");
+}
+
+#[test]
+fn linked_folders_are_searched_once() {
+    let lab = Lab::with_three_runs();
+    fs::rename(lab.path("runs"), lab.path("disk")).unwrap();
+    fs::create_dir(lab.path("runs")).unwrap();
+    symlink(lab.path("disk"), lab.path("runs/disk")).unwrap();
+    symlink(lab.path("disk"), lab.path("runs/again")).unwrap();
+    symlink(lab.path("runs"), lab.path("disk/back")).unwrap();
+    let recording = "20260325-120000-image/recording.mcap";
+    symlink(lab.path("disk").join(recording), lab.path("runs/one.mcap")).unwrap();
+    assert_eq!(lab.ingest()["runs_written"], 3);
+}
+
+#[test]
+fn folders_that_cannot_be_read_stop_nothing() {
+    let lab = Lab::with_three_runs();
+    symlink("loop", lab.path("runs/loop")).unwrap();
+    let closed = lab.path("runs/closed");
+    fs::create_dir(&closed).unwrap();
+    fs::set_permissions(&closed, Permissions::from_mode(0o000)).unwrap();
+    // Root reads it all the same.
+    let is_closed = fs::read_dir(&closed).is_err();
+    let said = lab.fleet(&["--json", "ingest", "runs", "--to", "fleet"]);
+    fs::set_permissions(&closed, Permissions::from_mode(0o755)).unwrap();
+    assert_eq!(said.code, Some(3), "{said:?}");
+    let told = said.json();
+    let paths: Vec<String> = failed(&told).into_iter().map(|(path, _)| path).collect();
+    assert_eq!((&told["runs_written"], paths.len()), (&3.into(), 1 + usize::from(is_closed)), "{told}");
+    assert_eq!(paths.last().map(String::as_str), Some("runs/loop"));
+    assert!(!is_closed || paths[0] == "runs/closed", "{told}");
 }
 
 #[test]
