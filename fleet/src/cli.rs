@@ -29,7 +29,7 @@ use crate::{
     ingest,
     output::{self, number_of},
     query::{Limits, Lines, OutFile, Query, Table},
-    survey::{self, Analysis, Calibrated, Discovered, findings, results, survey},
+    survey::{self, Analysis, Calibrated, Discovered, SurveyedRun, findings, results, survey},
 };
 
 /// Many recordings in one place: Parquet by rig and date.
@@ -216,7 +216,8 @@ fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs
         stop: Stop::on_signals().context("signals cannot be received")?,
     };
     let progress = Bar::new("runs", common.json);
-    let worked = survey::<T>(runtime, &place, &args.out, &worker, &|now| progress.show(now))?;
+    let runs = runtime.block_on(SurveyedRun::all(&place))?;
+    let worked = survey::<T>(runtime, &place, &runs, &args.out, &worker, &|now| progress.show(now))?;
     progress.clear();
     for run in &worked.lost {
         eprintln!("warning: {run} was taken over by another worker: this one had been silent for its lease");
@@ -224,8 +225,8 @@ fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs
     if worked.left > 0 {
         bail!("stopped; {} not done: the same command goes on", number_of(worked.left as u64, "run"));
     }
-    let calibrated = results::<Calibrated>(runtime, &place, &args.out)?;
-    let discovered = results::<Discovered>(runtime, &place, &args.out)?;
+    let calibrated = results::<Calibrated>(&place, &runs, &args.out)?;
+    let discovered = results::<Discovered>(&place, &runs, &args.out)?;
     let report = findings(place.url().as_str(), &calibrated, &discovered);
     let surveyed = Surveyed::from(&worked);
     let json =

@@ -1,6 +1,6 @@
 //! What a file says of its run, in its metadata.
 
-use futures::{StreamExt as _, TryStreamExt as _, stream};
+use futures::{StreamExt as _, stream};
 use object_store::{ObjectMeta, ObjectStoreExt as _};
 use parquet::{
     errors::ParquetError,
@@ -75,7 +75,7 @@ impl RunHead {
 
     /// What a file says; its rows are not read.
     pub(crate) async fn read(place: &Place, file: &ObjectMeta) -> Result<Self, HeadError> {
-        of_metadata(file, &metadata(place, file).await?)
+        of_metadata(file, &end(place, file).await?.0)
     }
 
     /// What these files say, in their order. Those that are not readable are left out.
@@ -105,24 +105,37 @@ pub(crate) struct Described {
     pub(crate) rig_json: String,
     pub(crate) frames: i64,
     pub(crate) bytes: u64,
+    /// CRC-32 of the file's last 64 KiB.
+    pub(crate) end_crc32: u32,
 }
 
 impl Described {
     /// What all files of a fleet say, in order of their paths.
     pub(crate) async fn all(place: &Place) -> Result<Vec<Self>, HeadError> {
-        let files = stream::iter(place.files().await?);
-        let reads = files.map(async |file| Self::read(place, &file).await);
-        reads.buffered(AT_A_TIME).try_collect().await
+        Self::each(place, |_, described| described).await?.into_iter().collect()
+    }
+
+    /// Takes what each file of a fleet says, or why it is not readable, in order of their paths.
+    pub(crate) async fn each<T>(
+        place: &Place,
+        take: impl Fn(ObjectMeta, Result<Self, HeadError>) -> T,
+    ) -> Result<Vec<T>, PlaceError> {
+        let reads = stream::iter(place.files().await?).map(async |file| {
+            let described = Self::read(place, &file).await;
+            (file, described)
+        });
+        Ok(reads.buffered(AT_A_TIME).map(|(file, described)| take(file, described)).collect().await)
     }
 
     /// What a file says; its rows are not read.
     pub(crate) async fn read(place: &Place, file: &ObjectMeta) -> Result<Self, HeadError> {
-        let metadata = metadata(place, file).await?;
+        let (metadata, end_crc32) = end(place, file).await?;
         Ok(Self {
             head: of_metadata(file, &metadata)?,
             rig_json: value(file, &metadata, RIG_METADATA_KEY)?.to_owned(),
             frames: metadata.file_metadata().num_rows(),
             bytes: file.size,
+            end_crc32,
         })
     }
 }
@@ -139,11 +152,15 @@ fn value<'a>(file: &ObjectMeta, metadata: &'a ParquetMetaData, key: &str) -> Res
     value.ok_or_else(|| not_of_run(file, format!("its metadata lack {key:?}")))
 }
 
-async fn metadata(place: &Place, file: &ObjectMeta) -> Result<ParquetMetaData, HeadError> {
+/// The metadata, and CRC-32 of the last 64 KiB.
+async fn end(place: &Place, file: &ObjectMeta) -> Result<(ParquetMetaData, u32), HeadError> {
     let mut wanted = END_BYTES.min(file.size);
+    let mut end_crc32 = None;
     loop {
         let end = place.store().get_range(&file.location, file.size - wanted..file.size);
         let end = end.await.map_err(|source| place.refused(source))?;
+        // A longer end comes later only.
+        let end_crc32 = *end_crc32.get_or_insert_with(|| crc32fast::hash(&end));
         let mut reader = ParquetMetaDataReader::new();
         match reader.try_parse_sized(&end, file.size) {
             Ok(()) => {}
@@ -153,7 +170,8 @@ async fn metadata(place: &Place, file: &ObjectMeta) -> Result<ParquetMetaData, H
             }
             Err(error) => return Err(not_of_run(file, error.to_string())),
         }
-        return reader.finish().map_err(|error| not_of_run(file, error.to_string()));
+        let metadata = reader.finish().map_err(|error| not_of_run(file, error.to_string()))?;
+        return Ok((metadata, end_crc32));
     }
 }
 

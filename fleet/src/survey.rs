@@ -1,16 +1,20 @@
 //! Calibration and discovery of every run of a fleet, and what their results say together.
 //!
 //! The result of each run is a file of its own in the output folder. Workers of one folder share the runs ([`tactus_work`]). A run is done
-//! again if its file in the fleet has changed, or another version of the program did it. Memory holds one run for each thread.
+//! again if its file in the fleet has changed or could not be read, or another version of the program did it. Memory holds one run for each
+//! thread.
 
 mod calibrated;
 mod discovered;
 mod findings;
+mod surveyed_run;
 mod trend;
 
 use std::{
+    any::Any,
     fs, io,
     marker::PhantomData,
+    panic::catch_unwind,
     path::{Path, PathBuf},
 };
 
@@ -22,11 +26,12 @@ use tactus_work::{Now, Stop, Work, Worked, Worker, work, write_whole};
 use tempfile::NamedTempFile;
 use tokio::{io::AsyncWriteExt as _, runtime::Handle};
 
-use crate::{Place, RunHead};
+use crate::Place;
 
 pub(crate) use calibrated::Calibrated;
 pub(crate) use discovered::Discovered;
 pub(crate) use findings::findings;
+pub(crate) use surveyed_run::SurveyedRun;
 
 /// What a survey does with each run.
 pub(crate) trait Analysis: Serialize + DeserializeOwned + Send + 'static {
@@ -51,6 +56,8 @@ pub(crate) struct RunResult<T> {
     pub(crate) simulated: bool,
     /// Size of the run's file in the fleet.
     bytes: u64,
+    /// CRC-32 of its last 64 KiB; none if they could not be read.
+    end_crc32: Option<u32>,
     pub(crate) outcome: Outcome<T>,
 }
 
@@ -62,10 +69,37 @@ pub(crate) enum Outcome<T> {
     Found(T),
     /// Why it has none.
     Refused(String),
+    /// Why its file could not be read; the next survey tries again.
+    Unread(String),
 }
 
-const SCHEMA: &str = "tactus.fleet.result/1";
+const SCHEMA: &str = "tactus.fleet.result/2";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+impl<T> RunResult<T> {
+    fn of(run: &SurveyedRun, outcome: Outcome<T>) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            version: VERSION.to_owned(),
+            run: run.run.clone(),
+            rig: run.rig.clone(),
+            date: run.date.clone(),
+            started_ns: run.started_ns,
+            simulated: run.simulated,
+            bytes: run.file.size,
+            end_crc32: run.end_crc32.as_ref().ok().copied(),
+            outcome,
+        }
+    }
+
+    /// True if this program made it of the run's file as it is now.
+    fn is_current(&self, run: &SurveyedRun) -> bool {
+        self.schema == SCHEMA
+            && self.version == VERSION
+            && self.bytes == run.file.size
+            && self.end_crc32 == run.end_crc32.as_ref().ok().copied()
+    }
+}
 
 #[cfg(test)]
 impl<T> RunResult<T> {
@@ -80,6 +114,7 @@ impl<T> RunResult<T> {
             started_ns: None,
             simulated: true,
             bytes: 0,
+            end_crc32: None,
             outcome,
         }
     }
@@ -89,13 +124,13 @@ impl<T> RunResult<T> {
 pub(crate) fn survey<T: Analysis>(
     runtime: &Handle,
     place: &Place,
+    runs: &[SurveyedRun],
     out: &Path,
     worker: &Worker,
     progress: &(dyn Fn(Now) + Sync),
 ) -> anyhow::Result<Worked> {
-    let files = runtime.block_on(place.files())?;
     let survey = Survey { runtime, place, out, analysis: PhantomData::<fn() -> T> };
-    work(&survey, &files, worker, &|_, now| progress(now))
+    work(&survey, runs, worker, &|_, now| progress(now))
 }
 
 /// Folder of the claims of an analysis.
@@ -112,47 +147,59 @@ struct Survey<'a, T> {
 }
 
 impl<T: Analysis> Work for Survey<'_, T> {
-    type Piece = ObjectMeta;
+    type Piece = SurveyedRun;
     type Made = RunResult<T>;
     type Error = anyhow::Error;
 
-    fn name(&self, file: &ObjectMeta) -> String {
-        self.place.in_fleet(&file.location).join("/")
+    fn name(&self, run: &SurveyedRun) -> String {
+        self.place.in_fleet(&run.file.location).join("/")
     }
 
-    fn size(&self, file: &ObjectMeta) -> u64 {
-        file.size
+    fn size(&self, run: &SurveyedRun) -> u64 {
+        run.file.size
     }
 
-    fn is_done(&self, file: &ObjectMeta) -> anyhow::Result<bool> {
-        let known = read::<T>(&result_path::<T>(self.out, self.place, file))?;
-        Ok(known.is_some_and(|known| known.bytes == file.size))
+    fn is_done(&self, run: &SurveyedRun) -> anyhow::Result<bool> {
+        let known = current::<T>(self.out, self.place, run)?;
+        Ok(known.is_some_and(|known| !matches!(known.outcome, Outcome::Unread(_))))
     }
 
-    fn make(&self, file: &ObjectMeta, stop: &Stop) -> anyhow::Result<Option<RunResult<T>>> {
-        let head = self.runtime.block_on(RunHead::read(self.place, file))?;
-        let table = self.runtime.block_on(fetched(self.place, file));
-        let table = table.with_context(|| file.location.to_string())?;
-        let path = table.path().to_owned();
-        let Some(found) = stop.unless_set(move || T::of(&path)) else { return Ok(None) };
-        Ok(Some(RunResult {
-            schema: SCHEMA.to_owned(),
-            version: VERSION.to_owned(),
-            run: head.run,
-            rig: head.rig,
-            date: head.date,
-            started_ns: head.started_ns,
-            simulated: head.simulated,
-            bytes: file.size,
-            outcome: found.map_or_else(Outcome::Refused, Outcome::Found),
-        }))
+    fn make(&self, run: &SurveyedRun, stop: &Stop) -> anyhow::Result<Option<RunResult<T>>> {
+        let table = match &run.end_crc32 {
+            Ok(_) => self.runtime.block_on(fetched(self.place, &run.file)),
+            Err(problem) => Err(anyhow::Error::msg(problem.clone())),
+        };
+        let outcome = match table {
+            Err(problem) => Outcome::Unread(format!("{problem:#}")),
+            Ok(table) => {
+                let path = table.path().to_owned();
+                let Some(outcome) = stop.unless_set(move || analysed(&path)) else { return Ok(None) };
+                outcome
+            }
+        };
+        Ok(Some(RunResult::of(run, outcome)))
     }
 
-    fn keep(&self, file: &ObjectMeta, result: RunResult<T>) -> anyhow::Result<()> {
-        let path = result_path::<T>(self.out, self.place, file);
+    fn keep(&self, run: &SurveyedRun, result: RunResult<T>) -> anyhow::Result<()> {
+        let path = result_path::<T>(self.out, self.place, &run.file);
         let text = serde_json::to_vec_pretty(&result)?;
         write_whole(&path, &text).with_context(|| path.display().to_string())
     }
+}
+
+/// Analyses a run's file. A defect of the analysis costs this run, not the survey.
+fn analysed<T: Analysis>(table: &Path) -> Outcome<T> {
+    match catch_unwind(|| T::of(table)) {
+        Ok(Ok(found)) => Outcome::Found(found),
+        Ok(Err(lacking)) => Outcome::Refused(lacking),
+        Err(panic) => Outcome::Refused(format!("a defect of this program: {}", said(panic.as_ref()))),
+    }
+}
+
+/// What a panic said.
+fn said(panic: &(dyn Any + Send)) -> &str {
+    let owned = panic.downcast_ref::<String>().map(String::as_str);
+    owned.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic without words")
 }
 
 /// Where the result of a run is: as its file in the fleet, in the folder of the analysis.
@@ -163,29 +210,30 @@ fn result_path<T: Analysis>(out: &Path, place: &Place, file: &ObjectMeta) -> Pat
     path
 }
 
-/// The result of a run; `None` if there is none, or one of another form or of another version of the program.
-fn read<T: Analysis>(path: &Path) -> anyhow::Result<Option<RunResult<T>>> {
-    match fs::read(path) {
+/// The result of a run; `None` if there is none, or one of another file or of another version of the program.
+fn current<T: Analysis>(
+    out: &Path,
+    place: &Place,
+    run: &SurveyedRun,
+) -> anyhow::Result<Option<RunResult<T>>> {
+    let path = result_path::<T>(out, place, &run.file);
+    match fs::read(&path) {
         Ok(text) => {
-            let is_ours = |result: &RunResult<T>| result.schema == SCHEMA && result.version == VERSION;
-            Ok(serde_json::from_slice(&text).ok().filter(is_ours))
+            let known = serde_json::from_slice::<RunResult<T>>(&text).ok();
+            Ok(known.filter(|known| known.is_current(run)))
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error).with_context(|| path.display().to_string()),
     }
 }
 
-/// The results of all runs that are in the fleet now.
+/// The results of those of the runs that have one.
 pub(crate) fn results<T: Analysis>(
-    runtime: &Handle,
     place: &Place,
+    runs: &[SurveyedRun],
     out: &Path,
 ) -> anyhow::Result<Vec<RunResult<T>>> {
-    let mut results = Vec::new();
-    for file in runtime.block_on(place.files())? {
-        results.extend(read(&result_path::<T>(out, place, &file))?);
-    }
-    Ok(results)
+    runs.iter().filter_map(|run| current(out, place, run).transpose()).collect()
 }
 
 /// A run's file on the local disk, until it is dropped.
@@ -199,3 +247,7 @@ async fn fetched(place: &Place, file: &ObjectMeta) -> anyhow::Result<NamedTempFi
     to.flush().await?;
     Ok(local)
 }
+
+#[cfg(test)]
+#[path = "survey_tests.rs"]
+mod tests;

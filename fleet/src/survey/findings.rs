@@ -49,11 +49,13 @@ pub(crate) fn findings(
     }
 }
 
-/// The runs without a result, and why.
+/// The runs that could not be judged, and why.
 fn refused<T>(results: &[RunResult<T>]) -> impl Iterator<Item = String> {
     results.iter().filter_map(|result| match &result.outcome {
         Outcome::Found(_) => None,
-        Outcome::Refused(problem) => Some(format!("{} of rig {}: {problem}", result.run, result.rig)),
+        Outcome::Refused(problem) | Outcome::Unread(problem) => {
+            Some(format!("{} of rig {}: {problem}", result.run, result.rig))
+        }
     })
 }
 

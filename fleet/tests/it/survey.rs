@@ -78,6 +78,46 @@ fn runs_that_show_nothing_are_told_and_not_searched_again() {
 }
 
 #[test]
+fn files_that_cannot_be_read_stop_no_survey_and_are_tried_again() {
+    let lab = Lab::with_three_runs();
+    lab.ingest();
+    let [cut, flawed] = [0, 1].map(|file| lab.path("fleet").join(&lab.files()[file]));
+    let whole = fs::read(&cut).unwrap();
+    fs::write(&cut, &whole[..whole.len() / 2]).unwrap();
+    // What the end of the file says is in order; the rows are not.
+    let mut rows = fs::read(&flawed).unwrap();
+    rows[4..2000].fill(0);
+    fs::write(&flawed, rows).unwrap();
+    let said = lab.fleet(&["--json", "calibrate", "--out", "survey"]);
+    assert_eq!(said.code, Some(3), "{said:?}");
+    let told = said.json();
+    let refused: Vec<_> =
+        told["refused"].as_array().unwrap().iter().map(|run| run.as_str().unwrap()).collect();
+    assert_eq!(refused.len(), 2, "{told}");
+    assert!(refused[0].starts_with("20260325-120000-image of rig left: "), "{told}");
+    assert!(refused[1].starts_with("20260325-120000-centres of rig right: "), "{told}");
+    assert!(lab.path("survey/report.html").exists());
+
+    fs::write(&cut, whole).unwrap();
+    let again = survey(&lab, "calibrate");
+    assert_eq!((&again["runs_analysed"], &again["runs_kept"]), (&1.into(), &2.into()), "{again}");
+}
+
+#[test]
+fn a_run_that_changed_within_its_size_is_analysed_again() {
+    let lab = Lab::with_three_runs();
+    lab.ingest();
+    survey(&lab, "calibrate");
+    let file = lab.path("fleet").join(&lab.files()[0]);
+    let mut changed = fs::read(&file).unwrap();
+    let at = changed.windows(11).rposition(|text| text == b"\"who\":\"ada\"").unwrap();
+    changed[at..at + 11].copy_from_slice(b"\"who\":\"eva\"");
+    fs::write(&file, changed).unwrap();
+    let told = survey(&lab, "calibrate");
+    assert_eq!((&told["runs_analysed"], &told["runs_kept"]), (&1.into(), &2.into()));
+}
+
+#[test]
 fn an_effect_that_two_of_three_rigs_have_is_found_in_their_recordings_and_told_as_shared() {
     let lab = Lab::new();
     // In a synthetic run two elements answer for others, unless it is planned without.
