@@ -16,7 +16,7 @@ use clap::{Args, Parser, Subcommand};
 use jiff::civil::Date;
 use serde::Serialize;
 use tactus_report::fleet::{FleetReport, Trend, fleet_html};
-use tactus_work::{Bar, Claims, LEASE_S, Stop, Worked, Worker, cores, write_whole};
+use tactus_work::{Bar, Claims, LEASE_S, Stop, Worker, cores, write_whole};
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 use tokio::sync::oneshot;
@@ -228,7 +228,14 @@ fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs
     let calibrated = results::<Calibrated>(&place, &runs, &args.out)?;
     let discovered = results::<Discovered>(&place, &runs, &args.out)?;
     let report = findings(place.url().as_str(), &calibrated, &discovered);
-    let surveyed = Surveyed::from(&worked);
+    let surveyed = Surveyed {
+        analysed: worked.done,
+        by_others: worked.by_others,
+        kept: worked.kept,
+        all: runs.len(),
+        calibrated: calibrated.len(),
+        searched: discovered.len(),
+    };
     let json =
         serde_json::to_string_pretty(&SurveyJson { schema: SURVEY_SCHEMA, surveyed, report: &report })?;
     let page = args.out.join("report.html");
@@ -365,12 +372,14 @@ struct Surveyed {
     by_others: usize,
     #[serde(rename = "runs_kept")]
     kept: usize,
-}
-
-impl From<&Worked> for Surveyed {
-    fn from(worked: &Worked) -> Self {
-        Self { analysed: worked.done, by_others: worked.by_others, kept: worked.kept }
-    }
+    /// In the fleet.
+    #[serde(rename = "runs_in_fleet")]
+    all: usize,
+    /// With a calibration by this version of their file as it is now; the report is of these, and for effects of those that were searched.
+    #[serde(rename = "runs_calibrated")]
+    calibrated: usize,
+    #[serde(rename = "runs_searched")]
+    searched: usize,
 }
 
 /// `report.json`, and what `--json` prints.
@@ -387,9 +396,20 @@ const SURVEY_SCHEMA: &str = "tactus.fleet.survey/1";
 
 /// What a survey found, in a few lines.
 fn in_short(surveyed: &Surveyed, report: &FleetReport, page: &Path) -> String {
-    let changing = |trends: &[Trend]| trends.iter().filter(|trend| trend.changes).count();
+    let changing = |trends: &[Trend]| {
+        let changing = trends.iter().filter(|trend| trend.changes).count();
+        if surveyed.calibrated == 0 {
+            "not calibrated".to_owned()
+        } else {
+            format!("{changing} of {}", trends.len())
+        }
+    };
     let shared = report.effects.iter().filter(|effect| effect.shared).map(|effect| effect.effect.as_str());
-    let shared: Vec<&str> = shared.collect();
+    let shared = match shared.collect::<Vec<&str>>().join(", ") {
+        _ if surveyed.searched == 0 => "not searched".to_owned(),
+        none if none.is_empty() => "no effect".to_owned(),
+        shared => shared,
+    };
     let simulated = if report.simulated { " (SIMULATED)" } else { "" };
     let by_others = match surveyed.by_others {
         0 => String::new(),
@@ -403,18 +423,21 @@ fn in_short(surveyed: &Surveyed, report: &FleetReport, page: &Path) -> String {
     };
     format!(
         "runs         {} analysed{by_others}, {} kept, of {}{simulated}\n\
-         drifts       {} of {}\n\
-         coverings    {} of {} age\n\
-         shared       {}\n\
+         calibrated   {} of {} runs\n\
+         searched     {} of {} runs\n\
+         drifts       {}\n\
+         ageing       {}\n\
+         shared       {shared}\n\
          {refused}report       {}\n",
         surveyed.analysed,
         surveyed.kept,
         number_of(report.rigs, "rig"),
+        surveyed.calibrated,
+        surveyed.all,
+        surveyed.searched,
+        surveyed.all,
         changing(&report.drifts),
-        report.drifts.len(),
         changing(&report.ageing),
-        report.ageing.len(),
-        if shared.is_empty() { "no effect".to_owned() } else { shared.join(", ") },
         page.display()
     )
 }

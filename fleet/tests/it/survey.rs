@@ -118,6 +118,27 @@ fn a_run_that_changed_within_its_size_is_analysed_again() {
 }
 
 #[test]
+fn a_report_says_how_many_runs_each_analysis_has_seen() {
+    let lab = Lab::with_three_runs();
+    lab.ingest();
+    let said = lab.fleet(&["calibrate", "--out", "survey"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    for line in ["calibrated   3 of 3 runs", "searched     0 of 3 runs", "shared       not searched"] {
+        assert!(said.out.lines().any(|told| told == line), "{line}: {said:?}");
+    }
+    // A run changes: what the search found in it does not count any more.
+    survey(&lab, "discover");
+    fs::remove_dir_all(lab.path("runs/20260325-120000-image")).unwrap();
+    lab.record("left", "20260325-120000-image", NOON_NS, 3);
+    lab.ingest();
+    let told = survey(&lab, "calibrate");
+    let counts = ["runs_in_fleet", "runs_calibrated", "runs_searched"].map(|name| told[name].as_u64().unwrap());
+    assert_eq!(counts, [3, 3, 2], "{told}");
+    let left = told["refused"].as_array().unwrap().iter().filter(|run| run.as_str().unwrap().contains("left"));
+    assert_eq!(left.count(), 0, "{told}");
+}
+
+#[test]
 fn an_effect_that_two_of_three_rigs_have_is_found_in_their_recordings_and_told_as_shared() {
     let lab = Lab::new();
     // In a synthetic run two elements answer for others, unless it is planned without.
