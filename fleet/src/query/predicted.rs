@@ -21,10 +21,11 @@ use datafusion::{
     },
     scalar::ScalarValue,
 };
-use tactus_model::{Covering, Effect, ForwardModel, Moment, Pipeline, Simulator};
+use tactus_model::{Array, Covering, Effect, ForwardModel, Moment, Pipeline, Simulator};
 use tactus_schema::{Model, Rig};
 
 use super::{lists::list_type, response::Response};
+use crate::output::number_of;
 
 /// The frames, each with two more lists: `prediction`, the counts that a model gives for the frame's tool, position and covering, and
 /// `residual`, the frame's counts minus these.
@@ -82,6 +83,9 @@ pub(crate) struct Prediction {
     signature: Signature,
 }
 
+/// Centres that differ by no more are written in other digits, not made otherwise.
+const CENTRES_AGREE_MM: f64 = 1e-6;
+
 /// The path tells models of one query apart.
 impl PartialEq for Prediction {
     fn eq(&self, other: &Self) -> bool {
@@ -136,14 +140,11 @@ impl Prediction {
     fn sensor(&self, description: &str, indenter: &str, covering_mm: f64) -> Result<Pipeline> {
         let rig = Rig::from_json(description)
             .map_err(|error| exec_datafusion_err!("a rig's description is wrong: {error}"))?;
-        let elements = [rig.array.elements(), self.model.array().elements()];
-        if elements[0] != elements[1] {
+        if let Some([of_rig, of_model]) = difference(&rig.array, self.model.array()) {
             return Err(exec_datafusion_err!(
-                "rig {} has {} elements, the model {} has {}: restrict the query to rigs that it fits, such as WHERE rig = 'NAME'",
+                "rig {} has {of_rig}, the model {} has {of_model}: restrict the query to rigs that it fits, such as WHERE rig = 'NAME'",
                 rig.name,
-                elements[0],
-                self.path,
-                elements[1]
+                self.path
             ));
         }
         let Some(indenter) = rig.indenters.get(indenter) else {
@@ -160,6 +161,23 @@ impl Prediction {
         };
         Pipeline::new(&simulator).map_err(|error| exec_datafusion_err!("{}: {error}", self.path))
     }
+}
+
+/// Where two arrays have their elements differently: first the number of rows or columns, then a centre. `None` if they do not.
+fn difference(one: &Array, other: &Array) -> Option<[String; 2]> {
+    let arrays = [one, other];
+    differ("row", arrays.map(Array::row_centres_mm))
+        .or_else(|| differ("column", arrays.map(Array::col_centres_mm)))
+}
+
+fn differ(line: &str, [one, other]: [&[f64]; 2]) -> Option<[String; 2]> {
+    if one.len() != other.len() {
+        return Some([one, other].map(|centres_mm| number_of(centres_mm.len() as u64, line)));
+    }
+    let mut pairs = one.iter().zip(other).enumerate();
+    let (at, (one_mm, other_mm)) =
+        pairs.find(|(_, (one_mm, other_mm))| (**one_mm - **other_mm).abs() > CENTRES_AGREE_MM)?;
+    Some([one_mm, other_mm].map(|centre_mm| format!("{line} {at} at {centre_mm} mm")))
 }
 
 impl ScalarUDFImpl for Prediction {

@@ -15,6 +15,10 @@ use crate::lab::{DAY_NS, Lab, NOON_NS, Said};
 
 const MODEL: &str = include_str!("../../../config/models/digitacts.toml");
 
+/// Where the model file has its rows and columns.
+const ROWS: &str = "row_centres_mm = [0.9, 2.9, 4.9, 6.9, 8.9, 10.9]";
+const COLS: &str = "col_centres_mm = [0.9, 2.9, 5.1, 7.1, 9.1, 11.1, 13.3, 15.3]";
+
 /// The rows of an answer.
 fn rows(said: &Said) -> Vec<Value> {
     assert_eq!(said.code, Some(0), "{said:?}");
@@ -227,11 +231,21 @@ fn models_that_do_not_fit_are_refused() {
     let effect = "\n[[effect]]\nname = \"time-lag\"\nparameters = { lag_s = 0.01 }\n";
     fs::write(lab.path("effect.toml"), format!("{MODEL}{OFFSET}{effect}")).unwrap();
     assert!(refused(&lab, &of("effect.toml")).contains("has the effect time-lag, which acts in time"));
-    let small = MODEL
-        .replace("rows = 6", "rows = 1")
-        .replace("row_centres_mm = [0.9, 2.9, 4.9, 6.9, 8.9, 10.9]", "row_centres_mm = [0.9]");
+    let small = MODEL.replace("rows = 6", "rows = 1").replace(ROWS, "row_centres_mm = [0.9]");
     fs::write(lab.path("small.toml"), small).unwrap();
-    assert!(refused(&lab, &of("small.toml")).contains("has 48 elements, the model small.toml has 8"));
+    assert!(refused(&lab, &of("small.toml")).contains("has 6 rows, the model small.toml has 1 row:"));
+    // As many elements, but eight rows of six.
+    let turned = MODEL
+        .replace("rows = 6", "rows = 8")
+        .replace("cols = 8", "cols = 6")
+        .replace(ROWS, "row_centres_mm = [0.9, 2.9, 4.9, 6.9, 8.9, 10.9, 12.9, 14.9]")
+        .replace(COLS, "col_centres_mm = [0.9, 2.9, 5.1, 7.1, 9.1, 11.1]");
+    fs::write(lab.path("turned.toml"), turned).unwrap();
+    assert!(refused(&lab, &of("turned.toml")).contains("has 6 rows, the model turned.toml has 8 rows"));
+    let moved = MODEL.replace(COLS, "col_centres_mm = [0.9, 2.9, 5.1, 7.2, 9.1, 11.1, 13.3, 15.3]");
+    fs::write(lab.path("moved.toml"), moved).unwrap();
+    let told = refused(&lab, &of("moved.toml"));
+    assert!(told.contains("has column 3 at 7.1 mm, the model moved.toml has column 3 at 7.2 mm"), "{told}");
     let told = refused(&lab, "SELECT residual FROM predicted()");
     assert!(told.contains("predicted('model.toml')"), "{told}");
 }
