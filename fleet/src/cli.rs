@@ -216,7 +216,7 @@ fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs
         stop: Stop::on_signals().context("signals cannot be received")?,
     };
     let progress = Bar::new("runs", common.json);
-    let runs = runtime.block_on(SurveyedRun::all(&place))?;
+    let (runs, left_out) = runtime.block_on(SurveyedRun::all(&place))?;
     let worked = survey::<T>(runtime, &place, &runs, &args.out, &worker, &|now| progress.show(now))?;
     progress.clear();
     for run in &worked.lost {
@@ -232,7 +232,8 @@ fn run_survey<T: Analysis>(runtime: &Runtime, common: &Common, args: &SurveyArgs
         analysed: worked.done,
         by_others: worked.by_others,
         kept: worked.kept,
-        all: runs.len(),
+        all: runs.len() + left_out,
+        left_out,
         calibrated: calibrated.len(),
         searched: discovered.len(),
     };
@@ -375,6 +376,9 @@ struct Surveyed {
     /// In the fleet.
     #[serde(rename = "runs_in_fleet")]
     all: usize,
+    /// Files of `tactus collect` whose frames are in runs, too.
+    #[serde(rename = "runs_left_out")]
+    left_out: usize,
     /// With a calibration by this version of their file as it is now; the report is of these, and for effects of those that were searched.
     #[serde(rename = "runs_calibrated")]
     calibrated: usize,
@@ -415,6 +419,13 @@ fn in_short(surveyed: &Surveyed, report: &FleetReport, page: &Path) -> String {
         0 => String::new(),
         number => format!(", {number} by other workers"),
     };
+    let left_out = match surveyed.left_out {
+        0 => String::new(),
+        number => format!(
+            "left out     {} of `tactus collect`, whose frames are in runs\n",
+            number_of(number as u64, "file")
+        ),
+    };
     let refused = match report.refused.as_slice() {
         [] => String::new(),
         refused => {
@@ -423,7 +434,7 @@ fn in_short(surveyed: &Surveyed, report: &FleetReport, page: &Path) -> String {
     };
     format!(
         "runs         {} analysed{by_others}, {} kept, of {}{simulated}\n\
-         calibrated   {} of {} runs\n\
+         {left_out}calibrated   {} of {} runs\n\
          searched     {} of {} runs\n\
          drifts       {}\n\
          ageing       {}\n\

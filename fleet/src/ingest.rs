@@ -140,7 +140,17 @@ pub fn ingest(
         }),
     };
     for_each(options.threads, &jobs, |job| {
-        let done = JobInProgress { runtime, place, register: &register, options, job, open: None, closed: Vec::new() }.run();
+        let done = JobInProgress {
+            runtime,
+            place,
+            register: &register,
+            options,
+            job,
+            open: None,
+            closed: Vec::new(),
+        }
+        .run();
+        register.take(done.iter().flatten());
         shared.take(job, done, progress);
     });
     let mut ingested = shared.ingested.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -182,7 +192,7 @@ impl Ingested {
         match written {
             Written::Kept => self.runs_kept += 1,
             Written::Refused(failed) => self.failed.push(failed),
-            Written::New { rows, bytes, warnings } => {
+            Written::New { rig: _, run: _, rows, bytes, warnings } => {
                 self.runs_written += 1;
                 self.rows += rows;
                 self.bytes += bytes;

@@ -33,6 +33,9 @@ pub struct RunHead {
     pub date: String,
     /// When it began, nanoseconds since 1970, UTC; none of runs in tables.
     pub started_ns: Option<i64>,
+    /// Time from its first frame to its last in nanoseconds; none in heads of form 1.
+    #[serde(default)]
+    pub frames_ns: Option<i64>,
     /// True if no physical sensor was read.
     pub simulated: bool,
     /// Name of the experiment; none of runs in tables, as the next two.
@@ -82,6 +85,11 @@ impl RunHead {
     pub(crate) async fn readable(place: &Place, files: Vec<ObjectMeta>) -> Vec<Self> {
         let reads = stream::iter(files).map(async |file| Self::read(place, &file).await.ok());
         reads.buffered(AT_A_TIME).filter_map(std::future::ready).collect().await
+    }
+
+    /// About when it ended, nanoseconds since 1970, UTC; none of runs in tables.
+    pub(crate) fn ended_ns(&self) -> Option<i64> {
+        Some(self.started_ns?.saturating_add(self.frames_ns.unwrap_or_default()))
     }
 
     /// True if its rows come from a recording.

@@ -10,7 +10,11 @@ use object_store::{ObjectMeta, path::Path as StorePath};
 use tokio::runtime::Handle;
 
 use super::{FailedFile, run_writer::Written};
-use crate::{Place, PlaceError, RunHead, twice::not_cut};
+use crate::{
+    Place, PlaceError, RunHead,
+    output::number_of,
+    twice::{collected_too, not_cut},
+};
 
 /// The runs that the fleet has, and those that the files of this ingest give.
 pub(super) struct Register<'a> {
@@ -20,6 +24,8 @@ pub(super) struct Register<'a> {
     there: BTreeMap<[String; 2], BTreeMap<String, ObjectMeta>>,
     /// The file that gives each run.
     given: Mutex<BTreeMap<Key, PathBuf>>,
+    /// Runs that were written.
+    written: Mutex<BTreeSet<Key>>,
 }
 
 /// A rig and a run of it.
@@ -30,7 +36,9 @@ type Key = (String, String);
 enum Refusal {
     #[error("its run {run:?} of rig {rig} is also in {}: of both files only that one is ingested", first.display())]
     AlsoIn { run: String, rig: String, first: PathBuf },
-    #[error("its run {run:?} of rig {rig} is in the fleet as it was recorded, which a table does not replace")]
+    #[error(
+        "its run {run:?} of rig {rig} is in the fleet as it was recorded, which a table does not replace"
+    )]
     Recorded { run: String, rig: String },
     #[error(
         "its run {run:?} of rig {rig} is in the fleet up to the presses that run {by:?} did again: give it together with the recording of that run"
@@ -53,7 +61,7 @@ impl<'a> Register<'a> {
                 there.entry([rig, run]).or_default().insert(date, file);
             }
         }
-        Ok(Self { runtime, place, there, given: Mutex::default() })
+        Ok(Self { runtime, place, there, given: Mutex::default(), written: Mutex::default() })
     }
 
     /// From now on the run comes from this file, unless another one gave it before; the file that gives it.
@@ -95,19 +103,26 @@ impl<'a> Register<'a> {
         }
     }
 
+    /// Notes which runs were written.
+    pub(super) fn take<'w>(&self, all: impl Iterator<Item = &'w Written>) {
+        let new = all.filter_map(|written| match written {
+            Written::New { rig, run, .. } => Some((rig.clone(), run.clone())),
+            Written::Kept | Written::Refused(_) => None,
+        });
+        self.written.lock().unwrap_or_else(PoisonError::into_inner).extend(new);
+    }
+
     /// What readers of the runs of this ingest must know, a sentence each, now that all are written.
+    ///
+    /// # Errors
+    /// If the fleet cannot be read.
     pub(super) fn warnings(&self) -> Result<Vec<String>, PlaceError> {
-        let given = self.given();
-        let is_given = |head: &RunHead| given.contains_key(&(head.rig.clone(), head.run.clone()));
-        let heads = self.heads_of_rigs(given.keys().map(|(rig, _)| rig.as_str()))?;
-        let not_cut = not_cut(&heads).filter(|(earlier, later)| is_given(earlier) || is_given(later));
-        let in_words = |(earlier, later): (&RunHead, &RunHead)| {
-            format!(
-                "run {} of rig {} goes on with run {}, which is in the fleet with the presses that were done again: ingest the recordings of both together",
-                later.run, later.rig, earlier.run
-            )
-        };
-        Ok(not_cut.map(in_words).collect())
+        let given: BTreeSet<Key> = self.given().keys().cloned().collect();
+        let heads = self.heads_of_rigs(given.iter().map(|(rig, _)| rig.as_str()))?;
+        let mut warnings = not_cut_in_words(&heads, &given);
+        let written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        warnings.extend(collected_too_in_words(&heads, &written));
+        Ok(warnings)
     }
 
     /// What the fleet's files of these rigs say now.
@@ -142,6 +157,41 @@ impl<'a> Register<'a> {
     fn given(&self) -> MutexGuard<'_, BTreeMap<Key, PathBuf>> {
         self.given.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Warns of presses that were done again, if a run of them was given.
+fn not_cut_in_words(heads: &[RunHead], given: &BTreeSet<Key>) -> Vec<String> {
+    let told = not_cut(heads).filter(|&(earlier, later)| is_among(given, earlier) || is_among(given, later));
+    let in_words = |(earlier, later): (&RunHead, &RunHead)| {
+        format!(
+            "run {} of rig {} goes on with run {}, which is in the fleet with the presses that were done again: ingest the recordings of both together",
+            later.run, later.rig, earlier.run
+        )
+    };
+    told.map(in_words).collect()
+}
+
+/// Warns of collections that have frames of a run, if one of both was written; a sentence for each rig.
+fn collected_too_in_words(heads: &[RunHead], written: &BTreeSet<Key>) -> Vec<String> {
+    let mut by_rig: BTreeMap<&str, Vec<(&RunHead, &RunHead)>> = BTreeMap::new();
+    for (collection, run) in collected_too(heads) {
+        if is_among(written, collection) || is_among(written, run) {
+            by_rig.entry(&collection.rig).or_default().push((collection, run));
+        }
+    }
+    let in_words = |(rig, pairs): (&str, Vec<(&RunHead, &RunHead)>)| {
+        let files = number_of(pairs.len() as u64, "file");
+        let (collection, run) = pairs.first()?;
+        Some(format!(
+            "rig {rig}: frames are in the fleet twice, in runs and in {files} of `tactus collect`, such as those of {} in {}. Surveys leave these files out; queries do with WHERE experiment IS DISTINCT FROM 'collect'",
+            run.run, collection.run
+        ))
+    };
+    by_rig.into_iter().filter_map(in_words).collect()
+}
+
+fn is_among(keys: &BTreeSet<Key>, head: &RunHead) -> bool {
+    keys.contains(&(head.rig.clone(), head.run.clone()))
 }
 
 /// Name of the folder that a rig's files are in.

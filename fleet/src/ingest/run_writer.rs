@@ -43,7 +43,7 @@ pub(super) enum Written {
     /// It is not taken from this file.
     Refused(FailedFile),
     /// It is there now.
-    New { rows: u64, bytes: u64, warnings: Vec<String> },
+    New { rig: String, run: String, rows: u64, bytes: u64, warnings: Vec<String> },
 }
 
 /// Why a run's file could not be written.
@@ -66,21 +66,19 @@ pub(super) struct RunWriter {
     head: RunHead,
     rows: Rows,
     rows_all: u64,
+    /// Times of the first row and of the last.
+    from_to_ns: Option<[i64; 2]>,
     /// `Err` has what becomes of a run whose rows are passed over.
     file: Result<ArrowWriter<SpooledTempFile>, Written>,
 }
 
 impl RunWriter {
-    pub(super) fn begin(
-        head: RunHead,
-        rig: &Rig,
-        passed_over: Option<Written>,
-    ) -> Result<Self, WriteError> {
+    pub(super) fn begin(head: RunHead, rig: &Rig, passed_over: Option<Written>) -> Result<Self, WriteError> {
         let file = match passed_over {
             Some(written) => Err(written),
             None => Ok(begun(&head, rig)?),
         };
-        Ok(Self { head, rows: Rows::new(), rows_all: 0, file })
+        Ok(Self { head, rows: Rows::new(), rows_all: 0, from_to_ns: None, file })
     }
 
     pub(super) fn run(&self) -> &str {
@@ -91,6 +89,8 @@ impl RunWriter {
         if self.file.is_err() {
             return Ok(());
         }
+        let [from_ns, _] = self.from_to_ns.unwrap_or([row.t_ns; 2]);
+        self.from_to_ns = Some([from_ns, row.t_ns]);
         self.rows.push(row);
         self.rows_all += 1;
         if self.rows.len() >= BATCH_ROWS { self.write_batch() } else { Ok(()) }
@@ -110,12 +110,13 @@ impl RunWriter {
         warnings: Vec<String>,
     ) -> Result<Written, WriteError> {
         self.write_batch()?;
-        let Self { mut head, rows_all: rows, file, .. } = self;
+        let Self { mut head, rows_all: rows, from_to_ns, file, .. } = self;
         let mut file = match file {
             Ok(file) => file,
             Err(written) => return Ok(written),
         };
         head.warnings.clone_from(&warnings);
+        head.frames_ns = from_to_ns.map(|[from_ns, to_ns]| to_ns.saturating_sub(from_ns));
         let run = head.run.clone();
         let in_parquet = |source| WriteError::Parquet { run: run.clone(), source };
         let pair = head.to_metadata().map_err(|error| in_parquet(ParquetError::External(error.into())))?;
@@ -137,7 +138,7 @@ impl RunWriter {
             bytes += read as u64;
         }
         runtime.block_on(to.shutdown()).map_err(upload)?;
-        Ok(Written::New { rows, bytes, warnings })
+        Ok(Written::New { rig: head.rig, run: head.run, rows, bytes, warnings })
     }
 }
 

@@ -1,8 +1,10 @@
 //! The runs that a survey is of.
 
+use std::collections::BTreeSet;
+
 use object_store::ObjectMeta;
 
-use crate::{Place, PlaceError, run_head::Described};
+use crate::{Place, PlaceError, RunHead, run_head::Described, twice::collected_too};
 
 /// A run of a fleet, as it is when a survey begins.
 #[derive(Debug)]
@@ -19,20 +21,30 @@ pub(crate) struct SurveyedRun {
 }
 
 impl SurveyedRun {
-    /// All runs of a fleet, in order of their paths.
+    /// All runs of a fleet, in order of their paths, without files of `tactus collect` whose frames are in runs, too; and the number of
+    /// these files.
     ///
     /// # Errors
     /// If the fleet cannot be listed. A file that is not readable says so itself.
-    pub(crate) async fn all(place: &Place) -> Result<Vec<Self>, PlaceError> {
-        Described::each(place, |file, described| match described {
-            Ok(described) => Self::readable(file, described),
-            Err(problem) => Self::unreadable(place, file, problem.to_string()),
-        })
-        .await
+    pub(crate) async fn all(place: &Place) -> Result<(Vec<Self>, usize), PlaceError> {
+        let files = Described::each(place, |file, described| {
+            (file, described.map(|Described { head, end_crc32, .. }| (head, end_crc32)))
+        });
+        let files = files.await?;
+        let heads: Vec<RunHead> =
+            files.iter().filter_map(|(_, read)| Some(read.as_ref().ok()?.0.clone())).collect();
+        let left_out: BTreeSet<_> =
+            collected_too(&heads).map(|(collection, _)| (&collection.rig, &collection.run)).collect();
+        let is_left_out = |head: &RunHead| left_out.contains(&(&head.rig, &head.run));
+        let all = files.into_iter().filter_map(|(file, read)| match read {
+            Ok((head, _)) if is_left_out(&head) => None,
+            Ok((head, end_crc32)) => Some(Self::readable(file, head, end_crc32)),
+            Err(problem) => Some(Self::unreadable(place, file, problem.to_string())),
+        });
+        Ok((all.collect(), left_out.len()))
     }
 
-    fn readable(file: ObjectMeta, described: Described) -> Self {
-        let Described { head, end_crc32, .. } = described;
+    fn readable(file: ObjectMeta, head: RunHead, end_crc32: u32) -> Self {
         Self {
             file,
             run: head.run,

@@ -347,6 +347,23 @@ fn a_continuation_beside_the_whole_of_its_run_is_told_in_either_order() {
 }
 
 #[test]
+fn frames_of_a_run_and_of_a_collection_are_told_once() {
+    let lab = Lab::with_three_runs();
+    lab.collect("left", "20260325-120001-left", NOON_NS + 1_000_000_000);
+    // Of the other rig, and of a time without a run.
+    lab.collect("right", "20260325-130000-right", NOON_NS + 3_600_000_000_000);
+    let ingest = || lab.fleet(&["ingest", "runs", "--to", "fleet"]);
+    let said = ingest();
+    assert_eq!((said.code, said.out.matches("warning: ").count()), (Some(3), 1), "{said:?}");
+    for told in ["rig left", "20260325-120000-image in 20260325-120001-left", "1 file of"] {
+        assert!(said.out.contains(told), "{said:?}");
+    }
+    assert_eq!(ingest().code, Some(0));
+    let sql = "SELECT run FROM runs WHERE experiment IS DISTINCT FROM 'collect'";
+    assert_eq!(lab.fleet(&["--json", "query", sql]).out.lines().count(), 3);
+}
+
+#[test]
 fn any_object_store_holds_a_fleet() {
     let lab = Lab::with_three_runs();
     let runtime = tokio::runtime::Runtime::new().unwrap();

@@ -85,18 +85,36 @@ impl Lab {
     }
 
     /// Records a run that goes on with another one, whose presses from 1 on it does again.
-    pub(crate) fn record_continued(&self, rig: &str, run_id: &str, started_ns: i64, earlier: &str) -> PathBuf {
+    pub(crate) fn record_continued(
+        &self,
+        rig: &str,
+        run_id: &str,
+        started_ns: i64,
+        earlier: &str,
+    ) -> PathBuf {
         let plan = Plan { run_id: run_id.to_owned(), ..Plan::short(2) };
         let taken_over = pb::TakenOver { run_id: earlier.to_owned(), first_press: 1, ..Default::default() };
-        self.record_told(rig, plan, started_ns, 1.0, Told { taken_over: Some(taken_over), ..Told::default() })
+        self.record_told(
+            rig,
+            plan,
+            started_ns,
+            1.0,
+            &Told { taken_over: Some(taken_over), ..Told::default() },
+        )
+    }
+
+    /// Records what `tactus collect` hears of a rig while it does a few presses.
+    pub(crate) fn collect(&self, rig: &str, run_id: &str, started_ns: i64) -> PathBuf {
+        let plan = Plan { run_id: run_id.to_owned(), ..Plan::short(2) };
+        self.record_told(rig, plan, started_ns, 1.0, &Told { experiment: "collect", ..Told::default() })
     }
 
     /// Records a run as planned, with a sensor whose rises are multiplied.
     pub(crate) fn record_plan(&self, rig: &str, plan: Plan, started_ns: i64, gain: f64) -> PathBuf {
-        self.record_told(rig, plan, started_ns, gain, Told::default())
+        self.record_told(rig, plan, started_ns, gain, &Told::default())
     }
 
-    fn record_told(&self, rig: &str, plan: Plan, started_ns: i64, gain: f64, told: Told) -> PathBuf {
+    fn record_told(&self, rig: &str, plan: Plan, started_ns: i64, gain: f64, told: &Told) -> PathBuf {
         let mut run = plan.make();
         let run_id = &run.plan.run_id.clone();
         rig.clone_into(&mut run.rig.name);

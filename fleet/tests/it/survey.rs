@@ -132,10 +132,24 @@ fn a_report_says_how_many_runs_each_analysis_has_seen() {
     lab.record("left", "20260325-120000-image", NOON_NS, 3);
     lab.ingest();
     let told = survey(&lab, "calibrate");
-    let counts = ["runs_in_fleet", "runs_calibrated", "runs_searched"].map(|name| told[name].as_u64().unwrap());
+    let counts =
+        ["runs_in_fleet", "runs_calibrated", "runs_searched"].map(|name| told[name].as_u64().unwrap());
     assert_eq!(counts, [3, 3, 2], "{told}");
-    let left = told["refused"].as_array().unwrap().iter().filter(|run| run.as_str().unwrap().contains("left"));
+    let left =
+        told["refused"].as_array().unwrap().iter().filter(|run| run.as_str().unwrap().contains("left"));
     assert_eq!(left.count(), 0, "{told}");
+}
+
+#[test]
+fn a_collection_whose_frames_are_in_a_run_is_left_out() {
+    let lab = Lab::with_three_runs();
+    lab.collect("left", "20260325-120001-left", NOON_NS + 1_000_000_000);
+    lab.collect("right", "20260325-130000-right", NOON_NS + 3_600_000_000_000);
+    let said = lab.fleet(&["ingest", "runs", "--to", "fleet"]);
+    assert_eq!(said.code, Some(3), "{said:?}");
+    let told = survey(&lab, "calibrate");
+    let counts = ["runs_analysed", "runs_left_out", "runs_in_fleet"].map(|name| told[name].as_u64().unwrap());
+    assert_eq!(counts, [4, 1, 5], "{told}");
 }
 
 #[test]
