@@ -90,22 +90,6 @@ fn a_supply_that_sags_is_drafted_as_a_share_of_the_signal_by_the_sum() {
     assert!((rise / want - 1.0).abs() < 0.15, "{rise} {want}");
 }
 
-/// That of the sum of all signals wins before anything is named.
-#[test]
-fn what_was_fitted_before_a_rival_won_is_told_with_what_it_would_close() {
-    let (_, _, found) = &*SAGGING;
-    let lost: Vec<_> = found.rounds.iter().filter(|round| round.rival.is_some()).collect();
-    assert!(!lost.is_empty(), "{:?}", found.rounds);
-    for round in lost {
-        assert_eq!(round.taken, None);
-        let fitted = round.candidates.iter().filter(|one| one.heldout_rms_counts.is_some());
-        assert!(
-            fitted.clone().count() > 0 && fitted.into_iter().all(|one| one.shrink.is_some()),
-            "{round:?}"
-        );
-    }
-}
-
 #[test]
 fn counts_that_come_with_contact_are_drafted_with_a_weight_for_each_element() {
     let weight = |element: usize| 0.5 + (element % 7) as f64 / 6.0;
