@@ -48,7 +48,7 @@ pub fn has_end_mark(path: &Path) -> Result<bool, RecordError> {
 }
 
 /// What a recording begins with, and then the messages in about the last `bytes` of it, complete or damaged. To the reader that looks like a
-/// file with a hole.
+/// file with a hole. One that was cut off within its index may have no messages there.
 ///
 /// # Errors
 /// If the file cannot be read.
