@@ -91,14 +91,13 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     };
     let mut warnings: Vec<String> = args.library.is_missing().into_iter().collect();
     for one in &library {
-        match one.of_another_array(&discovered.measured.rig.array) {
-            Some(warning) => warnings.push(warning),
-            None => {
-                // As it is after the experiments of `--active`.
-                let now = discovered.remeasured.iter().find(|other| other.path == one.path).unwrap_or(one);
-                discovered.lab.push(now.for_report()?);
-            }
+        if let Some(warning) = one.of_another_array(&discovered.measured.rig.array) {
+            warnings.push(warning);
+            continue;
         }
+        // As it is after the experiments of `--active`.
+        let now = discovered.remeasured.iter().find(|other| other.path == one.path).unwrap_or(one);
+        discovered.lab.push(now.for_report()?);
     }
     discovered.discovery.warnings.extend(warnings);
     let busy = Busy::with("writing", common.json);

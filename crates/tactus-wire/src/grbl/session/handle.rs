@@ -349,7 +349,11 @@ impl Session {
     fn free(&mut self, now: Duration, purpose: Purpose) {
         match purpose {
             Purpose::Stop { failure, .. } if self.moves() => self.hold(now, failure),
-            purpose => self.reset(now, purpose, 1),
+            purpose @ (Purpose::Greet
+            | Purpose::Recover
+            | Purpose::Clear
+            | Purpose::Look { .. }
+            | Purpose::Stop { .. }) => self.reset(now, purpose, 1),
         }
     }
 

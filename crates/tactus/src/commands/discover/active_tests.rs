@@ -18,7 +18,8 @@ fn next(experiment: &'static str, part: &str, separates: [&str; 2], duration_s: 
 /// A `diagnose` has parts of a least length, and others take no part.
 fn planned_s(one: &ChosenExperiment) -> Result<f64, String> {
     let scale = one.parameters.iter().find(|(name, _)| *name == "scale");
-    Ok(scale.map_or(1.0, |(_, scale)| scale.parse().unwrap()) * 770.0 + 170.0)
+    let scale = scale.map_or(Ok(1.0), |(_, scale)| scale.parse::<f64>());
+    scale.map(|scale| scale * 770.0 + 170.0).map_err(|error| error.to_string())
 }
 
 fn undecided_between(next_experiments: Vec<NextExperiment>) -> Discovery {
