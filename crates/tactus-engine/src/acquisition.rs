@@ -52,6 +52,8 @@ pub(crate) struct Acquisition {
     sensor_info: Option<pb::SensorInfo>,
     safety_seq: u64,
     clock: ClockWatch,
+    /// The last frame was too late to be fresh.
+    is_late: bool,
     /// Longest time between two looks at the clock.
     look_period: Duration,
     /// When the clock was last looked at, and when the run's state was last published.
@@ -197,6 +199,7 @@ impl Acquisition {
             sensor_info: None,
             safety_seq: 0,
             clock: ClockWatch::default(),
+            is_late: false,
         }
     }
 
@@ -249,7 +252,9 @@ impl Acquisition {
         self.tally.frames += 1;
         self.tally.frames_lost += u64::from(frame.lost_before);
         self.record(|sink| sink.frame(frame));
-        self.window = self.window.take().and_then(|window| window.take(frame));
+        let late_s = self.supervisor.late_s();
+        self.window = self.window.take().and_then(|window| window.take(frame, late_s.is_some()));
+        self.tell_late(late_s);
         self.watch_clock(frame);
         let clock_offset_s = self.clock.offset_s();
         self.beat(|pulse| {
@@ -269,8 +274,8 @@ impl Acquisition {
         } else {
             self.shared.publish.frame(frame);
         }
-        // The task is awake: it need not wake for the clock.
-        if frame.received.mono.since(self.looked) >= self.look_period / 2 {
+        // The task is awake: it need not wake for the clock. After a late frame, the ones in time may wait behind it.
+        if late_s.is_none() && frame.received.mono.since(self.looked) >= self.look_period / 2 {
             self.on_time();
         }
     }
@@ -289,6 +294,7 @@ impl Acquisition {
     fn on_connected(&mut self, info: &pb::SensorInfo) {
         info!(link = info.link, transport = info.transport, simulated = info.simulated, "sensor connected");
         let violation = self.supervisor.on_connected();
+        self.supervisor.set_tick(info.tick_ns);
         self.stop_for(violation.as_ref());
         self.window.iter_mut().for_each(Window::disturb);
         let now = self.shared.clock.now();
@@ -339,6 +345,18 @@ impl Acquisition {
         if let Some(violation) = violation {
             self.end_run(Ending::Safety(violation.clone()));
         }
+    }
+
+    /// Tells once that frames arrive late, until they are in time again.
+    fn tell_late(&mut self, late_s: Option<f64>) {
+        if let Some(late_s) = late_s.filter(|_| !self.is_late) {
+            warn!(
+                late_s,
+                "frames arrive late by the sensor's clock, and do not count as fresh: its link, or this computer, is too slow, or the \
+                 link file's tick is wrong"
+            );
+        }
+        self.is_late = late_s.is_some();
     }
 
     /// Records and publishes a broken rule, after motion was stopped.

@@ -12,7 +12,7 @@ pub(crate) struct Average {
     pub(crate) rms_counts: Vec<f64>,
     /// Number of frames averaged.
     pub(crate) frames: u32,
-    /// Frames of the interval that were lost.
+    /// Frames of the interval that were lost, or that arrived too late to be of it.
     pub(crate) lost: u64,
     /// True if the sensor connected anew meanwhile.
     pub(crate) is_disturbed: bool,
@@ -64,15 +64,21 @@ impl Window {
         self.is_disturbed = true;
     }
 
-    /// Adds a frame. Returns itself while it needs more frames.
-    pub(crate) fn take(mut self, frame: &Frame) -> Option<Self> {
+    /// Adds a frame. Returns itself while it needs more frames. A late frame was sampled at another time than it seems: it counts as
+    /// lost.
+    pub(crate) fn take(mut self, frame: &Frame, is_late: bool) -> Option<Self> {
         let at = frame.received.mono;
         if at < self.from {
             return Some(self);
         }
         self.lost += u64::from(frame.lost_before);
+        if is_late {
+            self.lost += 1;
+        }
         if at < self.until || self.frames == 0 {
-            self.add(frame);
+            if !is_late {
+                self.add(frame);
+            }
             return Some(self);
         }
         let freedom = f64::from((self.frames - 1).max(1));

@@ -21,7 +21,7 @@ fn frame(at_ms: i64, count: f32, lost_before: u32) -> Frame {
 fn average(from_ms: i64, until_ms: i64, frames: &[Frame]) -> Option<Average> {
     let at = |ms: i64| MonoTime::from_ns(ms * 1_000_000);
     let (window, mut average) = Window::open(at(from_ms), at(until_ms));
-    frames.iter().try_fold(window, Window::take);
+    frames.iter().try_fold(window, |window, frame| window.take(frame, false));
     average.try_recv().ok()
 }
 
@@ -53,4 +53,14 @@ fn a_time_shorter_than_a_period_gets_the_next_frame() {
 #[test]
 fn it_waits_until_its_end_has_passed() {
     assert_eq!(average(10, 30, &[frame(15, 1.0, 0), frame(20, 1.0, 0)]), None);
+}
+
+#[test]
+fn a_late_frame_counts_as_lost() {
+    let at = |ms: i64| MonoTime::from_ns(ms * 1_000_000);
+    let (window, mut average) = Window::open(at(10), at(30));
+    let frames = [(frame(12, 1.0, 0), false), (frame(20, 9.0, 0), true), (frame(40, 1.0, 0), false)];
+    frames.iter().try_fold(window, |window, (frame, is_late)| window.take(frame, *is_late));
+    let average = average.try_recv().unwrap();
+    assert_eq!((average.mean_counts, average.frames, average.lost), (vec![1.0, 2.0], 1, 1));
 }

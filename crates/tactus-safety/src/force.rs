@@ -77,9 +77,9 @@ impl Elements {
         self.tare = None;
     }
 
-    /// Takes a frame. Elements that were not read are ignored: their value in the frame is an earlier one. False if it reads
-    /// no watched element: it shows no load, and counts as none.
-    pub(crate) fn take(&mut self, frame: &Frame) -> bool {
+    /// Takes a frame. Elements that were not read are ignored: their value in the frame is an earlier one. False if it is late or
+    /// reads no watched element: its loads count, but it does not show that there are none now.
+    pub(crate) fn take(&mut self, frame: &Frame, is_late: bool) -> bool {
         let at = frame.received.mono;
         self.counts.clear();
         let read = |counts: &f32| if counts.is_finite() { f64::from(*counts) } else { f64::NAN };
@@ -92,15 +92,16 @@ impl Elements {
         }
         self.last_read.resize(self.counts.len(), None);
         for (last_read, counts) in self.last_read.iter_mut().zip(&self.counts) {
-            *last_read = if counts.is_nan() { *last_read } else { Some(at) };
+            *last_read = if counts.is_nan() || is_late { *last_read } else { Some(at) };
         }
         let is_watched = |element: &usize| !self.rig.unwatched.contains(element);
         let is_one =
             self.counts.iter().enumerate().any(|(element, counts)| !counts.is_nan() && is_watched(&element));
-        if is_one {
+        let is_fresh = is_one && !is_late;
+        if is_fresh {
             self.last_frame = Some(at);
         }
-        is_one
+        is_fresh
     }
 
     /// Sets the run's first zero, which is the tare, too.

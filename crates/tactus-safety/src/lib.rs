@@ -9,6 +9,7 @@
 mod contact;
 mod fault;
 mod force;
+mod lateness;
 mod limits;
 mod permit;
 mod supervisor;

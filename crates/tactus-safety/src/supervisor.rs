@@ -9,6 +9,7 @@ use tactus_schema::{Frame, MonoTime, Rig, pb};
 
 use crate::contact::Contact;
 use crate::force::Elements;
+use crate::lateness::Lateness;
 use crate::limits::{Limits, REPORT_AGE_MAX_S, STEP_DOWN_MAX_MM};
 use crate::{Denied, Fault, HomingPermit, Permit, Revocation, Target, Violation};
 
@@ -17,6 +18,9 @@ use crate::{Denied, Fault, HomingPermit, Permit, Revocation, Target, Violation};
 pub struct Supervisor {
     limits: Limits,
     elements: Elements,
+    lateness: Lateness,
+    /// By how much the last frame was late, if by too much.
+    late_s: Option<f64>,
     contact: Contact,
     permits: Revocation,
     /// The last report of the stage.
@@ -42,6 +46,8 @@ impl Supervisor {
         let limits = Limits::new(rig, service);
         Self {
             elements: Elements::new(rig, service),
+            lateness: Lateness::default(),
+            late_s: None,
             contact: Contact::new(rig, service),
             limits,
             permits: Revocation::default(),
@@ -90,7 +96,8 @@ impl Supervisor {
 
     /// Checks a frame.
     pub fn on_frame(&mut self, frame: &Frame) -> Option<Violation> {
-        if self.elements.take(frame) {
+        self.late_s = self.lateness.take(frame, self.limits.silence_max_s());
+        if self.elements.take(frame, self.late_s.is_some()) {
             self.z_at_frame_mm = self.z_mm;
         }
         let position_mm = self.position_mm();
@@ -101,6 +108,17 @@ impl Supervisor {
         let is_watched = self.is_active || self.is_near();
         let overload = is_watched.then(|| self.elements.overload(&self.limits)).flatten();
         self.trip(overload.or(response))
+    }
+
+    /// Length of a tick of the clock of the sensor that has connected, in ns; 0 if it has none. By it the supervisor sees how long
+    /// frames were on their way: one that waited longer than a silence may last does not count as fresh.
+    pub fn set_tick(&mut self, tick_ns: u64) {
+        self.lateness = Lateness::new(tick_ns, self.limits.silence_max_s());
+    }
+
+    /// By how many seconds the last frame arrived too late to be fresh; `None` if it was in time.
+    pub fn late_s(&self) -> Option<f64> {
+        self.late_s
     }
 
     /// The sensor connected anew: its zeros do not hold any more, and nothing goes down before new ones are taken.

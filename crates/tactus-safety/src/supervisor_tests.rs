@@ -1,4 +1,4 @@
-use tactus_schema::{FrameFlags, Rig, TimeStamp, WallTime};
+use tactus_schema::{DeviceTick, FrameFlags, Rig, TimeStamp, WallTime};
 
 use super::*;
 use crate::Void;
@@ -579,4 +579,28 @@ fn a_zero_without_an_element_is_refused_and_the_baseline_still_limits() {
     let mut supervisor = supervisor();
     assert_eq!(supervisor.set_reference(&[]), Err(Violation::Unread { element: 0 }));
     assert_eq!(supervisor.on_frame(&frame(1000, &[4000.0; 48])).unwrap().rule(), "element-force");
+}
+
+#[test]
+fn frames_that_a_link_keeps_back_are_not_fresh() {
+    let mut supervisor = ready(-0.3);
+    supervisor.set_tick(1_000_000);
+    let sampled_ms = |tick_ms: u64, at_ms: i64| Frame {
+        device_tick: Some(DeviceTick(tick_ms)),
+        ..frame(at_ms, &[100.0; 48])
+    };
+    let mut violation = None;
+    // Sampled every 33 ms, and 59 ms apart when they arrive.
+    for (tick_ms, arrived_ms) in (0..12).map(|at| (33 * at, 1010 + 59 * i64::try_from(at).unwrap())) {
+        violation = violation.or(supervisor.on_frame(&sampled_ms(tick_ms, arrived_ms)));
+        violation = violation.or(supervisor.on_time(at_ms(arrived_ms + 58)));
+    }
+    assert!(matches!(violation, Some(Violation::Silence { .. })), "{violation:?}");
+    assert!(supervisor.late_s().is_some_and(|late_s| late_s > 0.25));
+    // They still show a load.
+    let loaded = Frame { counts: [3000.0; 48].into(), ..sampled_ms(400, 1720) };
+    assert!(matches!(
+        supervisor.on_frame(&loaded),
+        Some(Violation::ElementForce { .. } | Violation::SumForce { .. })
+    ));
 }
