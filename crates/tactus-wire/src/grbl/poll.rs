@@ -3,21 +3,30 @@
 use core::time::Duration;
 use std::collections::VecDeque;
 
-/// A report that is later than this is lost.
-const LATE_MAX: Duration = Duration::from_millis(300);
+/// Reports that have not arrived after a pause of this length, in which nothing is asked, are lost.
+const PAUSE: Duration = Duration::from_millis(500);
+
+/// Queries that can be outstanding. A later one is not noted: its report then counts as an answer to an older one.
+const OUTSTANDING_MAX: usize = 64;
 
 /// A link without any report for this long is dead.
 const SILENCE_MAX: Duration = Duration::from_secs(2);
 
 /// Requests status reports, one at a time.
+///
+/// A report has no number. It counts as the answer to the oldest query that has none, so that it is never believed to be
+/// younger than it is. A report that is lost makes all later ones seem older than they are, which costs a look a query more.
+/// At rest a pause tells lost reports from late ones.
 #[derive(Debug, Clone, Default)]
 pub(super) struct StatusPoll {
     /// When the last query was sent.
     last: Option<Duration>,
     /// When the first query since the last report was sent.
     waiting: Option<Duration>,
-    /// When the queries were sent whose reports have not arrived, late ones included. At most one in 20 ms for this long.
+    /// When the queries were sent whose reports have not arrived, the oldest first.
     sent: VecDeque<Duration>,
+    /// When the last report arrived.
+    reported: Option<Duration>,
     /// The next query does not wait for the interval.
     at_once: bool,
 }
@@ -30,6 +39,15 @@ impl StatusPoll {
             (Some(last), None) if !self.at_once => last + interval,
             _ => Duration::ZERO,
         }
+    }
+
+    /// The interval of a stage at rest: longer if a report is missing, until it is known to be lost.
+    pub(super) fn interval_at_rest(&self, interval: Duration) -> Duration {
+        let pause = match (self.last, self.reported) {
+            (Some(last), Some(reported)) if !self.sent.is_empty() => (reported + PAUSE).saturating_sub(last),
+            _ => Duration::ZERO,
+        };
+        interval.max(pause)
     }
 
     /// Sends the next query as soon as none is unanswered.
@@ -46,22 +64,23 @@ impl StatusPoll {
 
     /// Notes that a query is sent now.
     pub(super) fn sent(&mut self, now: Duration) {
+        let has_paused = self.reported.is_some_and(|reported| now.saturating_sub(reported) >= PAUSE);
+        if self.waiting.is_none() && has_paused {
+            self.sent.clear();
+        }
         self.last = Some(now);
         self.waiting.get_or_insert(now);
-        self.sent.push_back(now);
-        self.forget_lost(now);
+        if self.sent.len() < OUTSTANDING_MAX {
+            self.sent.push_back(now);
+        }
         self.at_once = false;
     }
 
     /// Notes that a report arrived. Returns the earliest time at which it was requested; `None` if it was not.
     pub(super) fn answered(&mut self, now: Duration) -> Option<Duration> {
         self.waiting = None;
-        self.forget_lost(now);
+        self.reported = Some(now);
         self.sent.pop_front()
-    }
-
-    fn forget_lost(&mut self, now: Duration) {
-        while self.sent.pop_front_if(|sent| now.saturating_sub(*sent) > LATE_MAX).is_some() {}
     }
 
     /// True if the last query repeats an unanswered one.

@@ -259,7 +259,7 @@ impl Session {
             Phase::Homing { accepted, .. } => accepted.map(|_| POLL_MOVING),
             // A query now would only delay the one that follows the `ok`.
             Phase::Moving(ref travel) if travel.awaits_ok() => Some(POLL_SENT),
-            Phase::Ready if !self.moves() => Some(POLL_IDLE),
+            Phase::Ready if !self.moves() => Some(self.poll.interval_at_rest(POLL_IDLE)),
             Phase::Ready | Phase::Moving(_) | Phase::Holding { .. } | Phase::Looking { .. } => {
                 Some(POLL_MOVING)
             }
