@@ -111,6 +111,9 @@ pub enum Fault {
     /// The stage does not know its position, as after a reset of its controller.
     #[error("the stage does not know where it is")]
     Unhomed,
+    /// The stage was lost and is back. That its position is known is good enough for the way up alone.
+    #[error("the stage did not answer for a while")]
+    Away,
     /// A rule was broken.
     #[error("a safety rule was broken: {0}")]
     Tripped(Violation),
@@ -126,7 +129,7 @@ impl Fault {
     /// Which of two faults is told: the one of the higher rank, else the earlier one.
     pub(crate) fn rank(&self) -> u8 {
         match self {
-            Self::Started | Self::Unfinished | Self::Alarm | Self::Unhomed => 0,
+            Self::Started | Self::Unfinished | Self::Alarm | Self::Unhomed | Self::Away => 0,
             Self::Tripped(_) => 1,
             Self::Defect(_) => 2,
             Self::NotRetracted(_) => 3,

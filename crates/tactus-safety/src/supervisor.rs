@@ -132,7 +132,12 @@ impl Supervisor {
     /// Checks a report of the stage. If the stage does not know its position, the last known height is kept.
     pub fn on_report(&mut self, report: &pb::StageState) -> Option<Violation> {
         let stood_mm = self.standing_mm().ok();
+        let is_back =
+            self.status() == StageStatus::Disconnected && report.status() != StageStatus::Disconnected;
         self.report = Some(*report);
+        if is_back && self.z_mm.is_some() {
+            self.latch(Fault::Away);
+        }
         if let Some(stood_mm) = stood_mm
             && !self.stands_at(stood_mm)
         {
@@ -200,7 +205,7 @@ impl Supervisor {
     /// [`Denied`], with the reason.
     pub fn permit_homing(&mut self, now: MonoTime) -> Result<HomingPermit, Denied> {
         match self.fault() {
-            None | Some(Fault::Unfinished | Fault::Unhomed) => {}
+            None | Some(Fault::Unfinished | Fault::Unhomed | Fault::Away) => {}
             Some(fault) => return Err(Denied::Fault(fault)),
         }
         if self.has_sensor {

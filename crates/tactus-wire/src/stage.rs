@@ -15,7 +15,7 @@ mod axis;
 mod course;
 mod session;
 
-pub use action::{Action, Alarm, Cause, Controller, Failure, Report, Setting, Status};
+pub use action::{Action, Alarm, Cause, Controller, Failure, Report, Setting, Status, Whereabouts};
 pub use axis::{AxisName, Direction};
 pub use session::Session;
 

@@ -247,11 +247,24 @@ async fn a_stage_that_falls_silent_is_held_and_found_again() {
     assert!(shared.first_heard("!").is_some());
     assert_eq!(stage.state().borrow().status(), StageStatus::Disconnected);
     assert!(matches!(stage.move_to(permit(to(2.0, 10.0))).await, Err(StageError::Device(_))));
+    // It stands on its way, and has not been reset by others.
+    let epoch = stage.state().borrow().epoch;
+    until(&stage, StageStatus::Idle).await;
+    assert!(stage.state().borrow().epoch > epoch, "no dwell outlasts it");
+    stage.move_to(permit(to(2.0, 10.0))).await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stage_that_was_moved_while_it_was_silent_must_be_homed() {
+    let (stage, shared) = homed().await;
+    shared.fall_silent();
+    until(&stage, StageStatus::Disconnected).await;
+    shared.place([1.0, 1.0, 4.0]);
     until(&stage, StageStatus::Unhomed).await;
 }
 
 #[tokio::test(start_paused = true)]
-async fn an_unplugged_stage_fails_the_move_and_is_unhomed_when_it_is_back() {
+async fn an_unplugged_stage_fails_the_move_and_keeps_its_place_if_it_has_arrived_when_it_is_back() {
     let (stage, reports, mut port) = start();
     tokio::spawn(drain(reports));
     let shared = Shared::new();
@@ -276,8 +289,8 @@ async fn an_unplugged_stage_fails_the_move_and_is_unhomed_when_it_is_back() {
     until(&stage, StageStatus::Disconnected).await;
     sleep(Duration::from_secs(5)).await;
     tokio::spawn(fake::run(plugged.await.unwrap(), shared));
-    until(&stage, StageStatus::Unhomed).await;
-    stage.home(homing()).await.unwrap();
+    until(&stage, StageStatus::Idle).await;
+    stage.move_to(permit(to(2.0, 10.0))).await.unwrap();
 }
 
 #[tokio::test(start_paused = true)]

@@ -9,7 +9,7 @@ use futures_util::FutureExt;
 
 use tactus_safety::{HomingPermit, Permit, Void};
 use tactus_schema::{MonoTime, TimeStamp, pb};
-use tactus_wire::stage::{Action, Cause, Failure, Report, Session, Status};
+use tactus_wire::stage::{Action, Cause, Failure, Report, Session, Status, Whereabouts};
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::{Instant, sleep, sleep_until};
@@ -74,6 +74,8 @@ pub(super) struct Progress {
     waiting: VecDeque<pb::StageState>,
     /// See [`pb::StageState::epoch`].
     epoch: u32,
+    /// What the session of the last connection knew.
+    whereabouts: Option<Whereabouts>,
     /// The kind of the present loss, once it has been logged.
     logged: Option<ErrorKind>,
 }
@@ -166,6 +168,21 @@ where
             Ok(session) => session,
             Err(why) => return Ok(DeviceError::new(self.device(), ErrorKind::Protocol, why)),
         };
+        if let Some(known) = self.progress.whereabouts.take() {
+            session.recall(known);
+        }
+        let ended = self.drive(&mut session, link, backoff).await;
+        self.progress.whereabouts = session.whereabouts();
+        ended
+    }
+
+    /// Carries out what a session asks for, and gives it what happens, until it fails.
+    async fn drive(
+        &mut self,
+        session: &mut S,
+        link: &mut Link,
+        backoff: &mut Backoff,
+    ) -> Result<DeviceError, Unused> {
         let mut now = self.clock.now();
         let mut actions = session.start(since_start(now));
         // One for all signs of life: to move it to a later time costs almost nothing.
@@ -210,7 +227,7 @@ where
                 request = self.requests.recv(), if has_room && takes_requests => {
                     let Some(request) = request else { return Err(Unused) };
                     now = self.clock.now();
-                    self.begin(now, request, &mut session)
+                    self.begin(now, request, session)
                 }
                 event = link.next(session.deadline()), if has_room => match event {
                     Ok((stamp, LinkEvent::Received(bytes))) => {

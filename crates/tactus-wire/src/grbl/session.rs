@@ -15,7 +15,7 @@ use super::settings::Settings;
 use super::work_frame::WorkFrame;
 use super::{Config, ConfigError, FEED_HOLD, MachineState, Response, SOFT_RESET, alarm_meaning};
 use crate::lines::Lines;
-use crate::stage::{self, Alarm, Cause, Failure, Session as _};
+use crate::stage::{self, Alarm, Cause, Failure, Session as _, Whereabouts};
 
 pub use error::SessionError;
 
@@ -38,7 +38,7 @@ const SAME_PLACE_MM: f64 = 0.0005;
 /// the rig file means.
 ///
 /// The position counts as known from a successful homing until an alarm, a reset by others, or a stop that had to reset
-/// the controller in motion.
+/// the controller in motion. It survives a loss of the link: see `docs/decisions/0063-the-way-up-survives-a-reconnect.md`.
 #[derive(Debug)]
 pub struct Session {
     config: Config,
@@ -67,6 +67,10 @@ pub struct Session {
     is_steady: bool,
     /// Resets in a row after which the controller was in a hold.
     frees: u32,
+    /// What the session of the last connection knew, unless the controller has been reset since by others.
+    recalled: Option<Whereabouts>,
+    /// End of the last move that has set out and has neither arrived nor been stopped.
+    bound_mm: Option<[f64; 3]>,
     unknown_lines: u64,
     actions: Vec<Action>,
 }
@@ -96,6 +100,8 @@ impl Session {
             stood_mm: None,
             is_steady: false,
             frees: 0,
+            recalled: None,
+            bound_mm: None,
             unknown_lines: 0,
             actions: Vec::new(),
         })
@@ -154,7 +160,20 @@ impl stage::Session for Session {
         self.unknown_lines + self.lines.dropped()
     }
 
+    fn whereabouts(&self) -> Option<Whereabouts> {
+        let (from_mm, to_mm) = (self.position_mm, self.bound_mm.unwrap_or(self.position_mm));
+        self.recalled.or(self.homed.then_some(Whereabouts { from_mm, to_mm }))
+    }
+
+    fn recall(&mut self, known: Whereabouts) {
+        self.recalled = Some(known);
+    }
+
     fn start(&mut self, now: Duration) -> Vec<Action> {
+        if self.recalled.is_some() {
+            // It may still move, and a reset in motion would cost the position.
+            self.send(FEED_HOLD);
+        }
         self.phase = Phase::Resetting { purpose: Purpose::Greet, resets: 0, deadline: now + LISTEN };
         self.finish(now)
     }
@@ -169,6 +188,7 @@ impl stage::Session for Session {
         }
         self.homed = false;
         self.is_proved = false;
+        self.bound_mm = None;
         self.forget_modes();
         // `?` is not answered during homing.
         self.poll.reset();
@@ -243,6 +263,8 @@ impl stage::Session for Session {
             Phase::Looking { purpose: Purpose::Greet, .. } | Phase::Asking { .. } => {
                 self.reset(now, Purpose::Greet, 1);
             }
+            // It was told to hold at the start, and a reset in motion would cost the position.
+            Phase::Resetting { resets: 0, .. } if self.recalled.is_some() => self.send(FEED_HOLD),
             Phase::Resetting { purpose, resets: 0, .. } => self.reset(now, purpose, 1),
             // It has been reset already, so nothing moves. Should a stop that others wrote hold it after that, the look finds it.
             Phase::Resetting { .. } | Phase::Over => {}
@@ -254,6 +276,7 @@ impl stage::Session for Session {
     fn withhold(&mut self, now: Duration) -> Vec<Action> {
         if matches!(self.phase, Phase::Moving(_) | Phase::Homing { .. }) {
             self.phase = Phase::Ready;
+            self.bound_mm = None;
             self.report();
             self.done(Err(Failure::Withheld));
         }

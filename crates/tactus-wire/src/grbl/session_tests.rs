@@ -13,6 +13,8 @@ mod connect;
 mod looks;
 #[path = "session_tests/moves.rs"]
 mod moves;
+#[path = "session_tests/returns.rs"]
+mod returns;
 #[path = "session_tests/settings.rs"]
 mod settings;
 #[path = "session_tests/stops.rs"]
@@ -22,7 +24,7 @@ use core::time::Duration;
 
 use super::{Action, Session};
 use crate::grbl::Config;
-use crate::stage::{Failure, Session as _};
+use crate::stage::{Failure, Session as _, Whereabouts};
 
 const TOLERANCE_MM: f64 = 0.005;
 
@@ -151,15 +153,19 @@ fn run_timers(session: &mut Session, until: Duration, is_input: bool, actual: &m
 
 fn command(session: &mut Session, now: Duration, text: &str) -> Vec<Action> {
     let words: Vec<&str> = text.split(' ').collect();
+    let place = |words: [&str; 3]| -> [f64; 3] { words.map(|mm| mm.parse().unwrap()) };
     match words[..] {
+        ["recall", x, y, z, "to", to_x, to_y, to_z] => {
+            let (from_mm, to_mm) = (place([x, y, z]), place([to_x, to_y, to_z]));
+            session.recall(Whereabouts { from_mm, to_mm });
+            Vec::new()
+        }
         ["start"] => session.start(now),
         ["home"] => session.home(now),
         ["look"] => session.look(now),
         ["stop"] => session.stop(now),
         ["clear"] => session.clear_alarm(now),
-        ["move", x, y, z, "at", speed] => {
-            session.move_to(now, [x, y, z].map(|mm| mm.parse().unwrap()), speed.parse().unwrap())
-        }
+        ["move", x, y, z, "at", speed] => session.move_to(now, place([x, y, z]), speed.parse().unwrap()),
         _ => panic!("no such command: {text}"),
     }
 }

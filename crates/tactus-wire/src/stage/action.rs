@@ -2,7 +2,8 @@
 
 use core::time::Duration;
 
-use super::AxisName;
+use super::course::nearest_on_line_mm;
+use super::{AxisName, distance_mm};
 
 /// What a session asks for or reports. `E` is the error that ends the session.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +57,23 @@ pub struct Report {
     pub status: Status,
     /// The alarm, if the controller reported which one.
     pub alarm: Option<Alarm>,
+}
+
+/// Where a homed stage stands whose link is lost: between two places, because a move may have been under way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whereabouts {
+    /// Where it was last reported, in mm.
+    pub from_mm: [f64; 3],
+    /// Where it was to go in a straight line, in mm.
+    pub to_mm: [f64; 3],
+}
+
+impl Whereabouts {
+    /// True if a place lies within this distance of the line between the two.
+    pub fn holds(&self, place_mm: [f64; 3], tolerance_mm: f64) -> bool {
+        let nearest_mm = nearest_on_line_mm(self.from_mm, self.to_mm, place_mm);
+        distance_mm(nearest_mm, place_mm) <= tolerance_mm
+    }
 }
 
 /// Status of the stage.

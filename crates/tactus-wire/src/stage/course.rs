@@ -47,23 +47,27 @@ impl Course {
 
     /// The nearest position on the way.
     fn nearest_mm(&self, position_mm: [f64; 3]) -> [f64; 3] {
-        let way = |axis: usize| -> Option<[f64; 3]> {
-            Some([*self.from_mm.get(axis)?, *self.target_mm.get(axis)?, *position_mm.get(axis)?])
-        };
         match self.shape {
-            Shape::Box => core::array::from_fn(|axis| {
-                way(axis).map_or(0.0, |[from, to, at]| at.max(from.min(to)).min(from.max(to)))
-            }),
-            Shape::Line => {
-                let length_mm = distance_mm(self.from_mm, self.target_mm);
-                let gone_mm2: f64 =
-                    (0..3).filter_map(way).map(|[from, to, at]| (at - from) * (to - from)).sum();
-                let share =
-                    if length_mm > 0.0 { (gone_mm2 / (length_mm * length_mm)).clamp(0.0, 1.0) } else { 0.0 };
-                core::array::from_fn(|axis| way(axis).map_or(0.0, |[from, to, _]| from + share * (to - from)))
+            Shape::Box => {
+                let way = by_axis(self.from_mm, self.target_mm, position_mm);
+                way.map(|[from, to, at]| at.max(from.min(to)).min(from.max(to)))
             }
+            Shape::Line => nearest_on_line_mm(self.from_mm, self.target_mm, position_mm),
         }
     }
+}
+
+/// The nearest position on the straight line between two others.
+pub(crate) fn nearest_on_line_mm(from_mm: [f64; 3], to_mm: [f64; 3], position_mm: [f64; 3]) -> [f64; 3] {
+    let way = by_axis(from_mm, to_mm, position_mm);
+    let length_mm = distance_mm(from_mm, to_mm);
+    let gone_mm2: f64 = way.iter().map(|[from, to, at]| (at - from) * (to - from)).sum();
+    let share = if length_mm > 0.0 { (gone_mm2 / (length_mm * length_mm)).clamp(0.0, 1.0) } else { 0.0 };
+    way.map(|[from, to, _]| from + share * (to - from))
+}
+
+fn by_axis([ax, ay, az]: [f64; 3], [bx, by, bz]: [f64; 3], [cx, cy, cz]: [f64; 3]) -> [[f64; 3]; 3] {
+    [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use super::{Action, Cause};
+use super::{Action, Cause, Whereabouts};
 
 /// The host's side of a stage protocol over one connection. Positions are in the stage's frame, as the session's
 /// configuration defines it.
@@ -34,6 +34,16 @@ pub trait Session {
 
     /// Lines that could not be parsed and unexpected messages, since the start.
     fn unknown_lines(&self) -> u64;
+
+    /// Where the stage stands, for the session of the next connection; `None` if that is not known. A protocol whose controllers
+    /// remember themselves whether they are homed has no need of it.
+    fn whereabouts(&self) -> Option<Whereabouts> {
+        None
+    }
+
+    /// Tells, before [`start`](Self::start), what the session of the last connection knew. The position counts as known if the
+    /// controller stands there and was not reset meanwhile.
+    fn recall(&mut self, _known: Whereabouts) {}
 
     /// Queries the controller for its identity, settings and position. Moves nothing.
     fn start(&mut self, now: Duration) -> Vec<Action<Self::Error>>;

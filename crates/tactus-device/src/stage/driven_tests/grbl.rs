@@ -69,6 +69,11 @@ impl Shared {
         self.0.lock().unwrap().silent = true;
     }
 
+    /// Puts it somewhere by hand.
+    pub(super) fn place(&self, at_mm: [f64; 3]) {
+        self.0.lock().unwrap().stand(at_mm);
+    }
+
     /// When a byte or line was heard first.
     pub(super) fn first_heard(&self, what: &str) -> Option<Instant> {
         self.0.lock().unwrap().heard.iter().find(|(_, heard)| heard == what).map(|(at, _)| *at)

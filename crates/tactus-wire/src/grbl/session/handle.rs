@@ -6,7 +6,7 @@ use super::phase::{Phase, Purpose, Query, Wanted};
 use super::{Action, Failure, SAME_PLACE_MM, Session, SessionError, alarm};
 use crate::grbl::active_move::ActiveMove;
 use crate::grbl::{FEED_HOLD, MachineState, Response, StatusReport, error_meaning};
-use crate::stage::{Controller, Judgement, distance_mm};
+use crate::stage::{Controller, Judgement, Whereabouts, distance_mm};
 
 /// Longest time for `$X`.
 const UNLOCK_TIMEOUT: Duration = Duration::from_secs(2);
@@ -99,10 +99,21 @@ impl Session {
         if let Some(offset_mm) = self.work_frame.foreign_mm() {
             return self.fail(SessionError::of_work_frame(offset_mm));
         }
+        self.homed = self.recalled.take().is_some_and(|known| self.stands_as_known(known));
         self.phase = Phase::Ready;
         let (identity, settings) = (self.identity.clone(), self.settings.list());
         self.actions.push(Action::Connected(Controller { identity, settings }));
         self.report();
+    }
+
+    /// True if the controller is where the last session left it, and has not been reset since by others. Switched on anew, or reset
+    /// in motion, it would be in alarm, because homing is on (`$22`); without that lock it would count from 0 again.
+    fn stands_as_known(&self, known: Whereabouts) -> bool {
+        let counts_anew = distance_mm(self.config.to_machine(self.position_mm), [0.0; 3]) < SAME_PLACE_MM;
+        self.state == Some(MachineState::Idle)
+            && self.alarm.is_none()
+            && !counts_anew
+            && known.holds(self.position_mm, self.config.tolerance_mm)
     }
 
     fn handle_error(&mut self, now: Duration, code: u8) {
@@ -148,6 +159,7 @@ impl Session {
         self.alarm = Some(code);
         self.state = Some(MachineState::Alarm);
         self.homed = false;
+        self.recalled = None;
         self.forget_modes();
         let ended = match &self.phase {
             Phase::Preparing(_)
@@ -170,6 +182,9 @@ impl Session {
     }
 
     fn handle_banner(&mut self, now: Duration, banner: &str) {
+        if !matches!(self.phase, Phase::Resetting { resets: 1.., .. }) {
+            self.recalled = None;
+        }
         self.poll.reset();
         self.forget_modes();
         self.work_frame.forget();
@@ -258,6 +273,7 @@ impl Session {
             }
             Judgement::Done => {
                 self.parsed_mm = Some(travel.parsed_mm());
+                self.bound_mm = None;
                 self.is_proved |= travel.is_absolute();
                 self.phase = Phase::Ready;
                 self.report();
@@ -389,6 +405,7 @@ impl Session {
                     held_mm.is_some_and(|held| distance_mm(held, position_mm) <= self.config.tolerance_mm);
                 // A stage that reports motion after a reset cannot be believed, and would not stop.
                 self.homed &= kept && !self.moves();
+                self.bound_mm = None;
                 self.phase = Phase::Ready;
                 self.report();
                 if let Some(failure) = failure {

@@ -87,6 +87,8 @@ impl Session {
     /// Resets the controller, for the `resets`th time.
     pub(super) fn reset(&mut self, now: Duration, purpose: Purpose, resets: u32) {
         self.send(SOFT_RESET);
+        // It may be moving.
+        self.homed &= !matches!(purpose, Purpose::Stop { held_mm: None, .. });
         self.phase = Phase::Resetting { purpose, resets, deadline: now + BANNER_TIMEOUT };
     }
 
@@ -120,6 +122,7 @@ impl Session {
             return self.set_feed(now, target_mm, speed_mm_per_s, feed, 1);
         }
         self.parsed_mm = None;
+        self.bound_mm = Some(travel.arrival().target_mm());
         self.send_motion(travel.line());
         self.poll.defer(now);
         self.phase = Phase::Moving(travel);
