@@ -186,6 +186,22 @@ async fn a_command_given_while_the_stage_comes_to_a_stand_waits_for_it() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_stage_that_nobody_else_could_stop_is_not_moved_unless_it_is_simulated() {
+    let (connector, port) = pair("stage");
+    let protocol = StageProtocol::Grbl(GrblAxes::default());
+    let options = StageOptions { simulated: false, ..OPTIONS };
+    let (stage, reports) = DrivenStage::start(Box::new(connector), &protocol, options, Clock::paused());
+    let shared = Shared::new();
+    tokio::spawn(fake::run(port, shared.clone()));
+    tokio::spawn(drain(reports));
+    until(&stage, StageStatus::Unhomed).await;
+    let refused = stage.home(homing()).await;
+    let Err(StageError::Refused { reason, .. }) = refused else { panic!("{refused:?}") };
+    assert!(reason.contains("use kind = \"serial\" or \"tcp\""), "{reason}");
+    assert_eq!(shared.count("$H"), 0);
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_second_move_is_refused_while_one_is_in_hand() {
     let (stage, _shared) = homed().await;
     let moving = begin(&stage, to(11.0, 10.0), Duration::from_millis(500)).await;

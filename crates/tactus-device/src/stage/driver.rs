@@ -281,7 +281,7 @@ where
         } else if let Err(void) = command.check(now.mono) {
             void.into()
         } else if command.is_motion()
-            && let Err(error) = self.guard.ready()
+            && let Err(error) = self.guard.ready(!self.options.simulated)
         {
             let reason = format!("no thread can guard it: {error}");
             StageError::Refused { command: format!("{command:?}"), reason }

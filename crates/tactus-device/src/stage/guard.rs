@@ -95,12 +95,16 @@ impl Guard {
         (watch.writer, watch.halt) = (writer, None);
     }
 
-    /// Sees to it that somebody looks before a command begins.
+    /// Sees to it that somebody looks before a command begins. A stage that is not simulated `needs` somebody.
     ///
     /// # Errors
     /// If nobody can. Then nothing may move.
-    pub(super) fn ready(&self) -> io::Result<()> {
+    pub(super) fn ready(&self, needs: bool) -> io::Result<()> {
         let mut watch = self.shared.watch();
+        if needs && watch.writer.is_none() {
+            let why = "its transport has no second way to write a stop; use kind = \"serial\" or \"tcp\"";
+            return Err(io::Error::new(io::ErrorKind::Unsupported, why));
+        }
         if watch.writer.is_some() && !watch.has_thread {
             let (shared, span) = (Arc::clone(&self.shared), tracing::Span::current());
             let guard = move || span.in_scope(|| shared.guard());
