@@ -15,3 +15,32 @@ fn a_thickness_is_kept_and_a_damaged_file_is_an_error() {
         assert!(error.to_string().contains("lab.covering.toml"), "{error}");
     }
 }
+
+#[test]
+fn a_covering_is_kept_although_the_folder_of_recordings_is_another_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (state, runs) = (folder.path().join("state"), folder.path().join("runs"));
+    CoveringFile::of("lab", &state).moved_from(&runs).remember(1.016).unwrap();
+    fs::create_dir_all(&runs).unwrap();
+    fs::rename(&runs, folder.path().join("runs-2026")).unwrap();
+    for recordings in [runs, folder.path().join("elsewhere")] {
+        let file = CoveringFile::of("lab", &state).moved_from(&recordings);
+        assert_eq!(file.recall().unwrap(), Some(1.016));
+    }
+}
+
+#[test]
+fn a_covering_that_an_earlier_version_kept_among_the_recordings_counts_and_is_kept_from_then_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (state, runs) = (folder.path().join("state"), folder.path().join("runs"));
+    CoveringFile::of("lab", &runs).remember(1.016).unwrap();
+    let file = CoveringFile::of("lab", &state).moved_from(&runs);
+    assert_eq!(file.recall().unwrap(), Some(1.016));
+    fs::remove_dir_all(&runs).unwrap();
+    assert_eq!(file.recall().unwrap(), Some(1.016));
+    // Of two, the newer counts.
+    CoveringFile::of("lab", &runs).remember(3.0).unwrap();
+    assert_eq!(file.recall().unwrap(), Some(1.016));
+    fs::write(folder.path().join("state/lab.covering.toml"), "").unwrap();
+    assert!(file.recall().is_err(), "a damaged file is not replaced by an old one");
+}
