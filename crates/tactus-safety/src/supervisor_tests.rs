@@ -582,6 +582,22 @@ fn a_zero_without_an_element_is_refused_and_the_baseline_still_limits() {
 }
 
 #[test]
+fn a_stage_that_was_away_may_go_up_and_nothing_else_before_a_reset() {
+    let mut supervisor = ready(-0.3);
+    let away = pb::StageState { status: StageStatus::Disconnected.into(), ..standing(-0.3) };
+    supervisor.on_report(&away);
+    assert_eq!(supervisor.permit(to(2.0), at_ms(1010)).unwrap_err(), Denied::NoStage);
+    supervisor.on_report(&standing(-0.3));
+    assert_eq!(supervisor.fault(), Some(Fault::Away));
+    assert_eq!(supervisor.permit(to(-0.35), at_ms(1010)).unwrap_err(), Denied::Fault(Fault::Away));
+    supervisor.permit(to(2.0), at_ms(1010)).unwrap();
+    supervisor.permit_homing(at_ms(1010)).unwrap();
+    supervisor.begin_reset(at_ms(1010));
+    supervisor.finish_reset(at_ms(1010)).unwrap();
+    assert_eq!(supervisor.fault(), None);
+}
+
+#[test]
 fn frames_that_a_link_keeps_back_are_not_fresh() {
     let mut supervisor = ready(-0.3);
     supervisor.set_tick(1_000_000);
