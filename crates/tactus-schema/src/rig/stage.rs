@@ -11,7 +11,8 @@ use crate::description::{WrongField, finite, positive, wrong};
 pub struct StageLink {
     /// The protocol, with the axes.
     pub protocol: StageProtocol,
-    /// How bytes get to the controller.
+    /// How bytes get to the controller: serial, TCP or embedded. The driver's guard needs a second way to write the stop, which
+    /// USB packets do not have.
     pub transport: Transport,
 }
 
@@ -236,7 +237,15 @@ impl RawStageLink {
                 (StageProtocol::Zaber(zaber), transport)
             }
         };
-        Ok(StageLink { protocol, transport: transport.check("stage.transport")? })
+        let transport = transport.check("stage.transport")?;
+        if let Transport::Usb(_) | Transport::Hid(_) = transport {
+            return Err(wrong(
+                "stage.transport.kind",
+                "serial or tcp: over usb and hid nobody but the service could write the stop, if it hangs; a controller on \
+                 a USB cable has a serial port, kind = \"serial\" with path or usb, which `tactus devices` shows",
+            ));
+        }
+        Ok(StageLink { protocol, transport })
     }
 }
 

@@ -127,3 +127,26 @@ fn unknown_and_missing_keys_are_refused_by_name() {
         assert!(error.contains(key) && error.contains("line"), "{key}: {error}");
     }
 }
+
+#[test]
+fn a_stage_has_a_link_over_which_its_guard_can_stop_it() {
+    let (sensor, link) = SIM.split_once("[stage]").unwrap();
+    for (transport, is_taken) in [
+        ("{ kind = \"serial\", path = \"/dev/ttyACM0\", baud = 115200 }", true),
+        ("{ kind = \"tcp\", address = \"127.0.0.1:4000\" }", true),
+        (
+            "{ kind = \"usb\", vid = 1, pid = 2, interface = 0, endpoint_in = 0x81, endpoint_out = 0x02 }",
+            false,
+        ),
+        ("{ kind = \"hid\", vid = 1, pid = 2 }", false),
+    ] {
+        let embedded = "transport = { kind = \"embedded\" }";
+        assert!(link.contains(embedded), "{link}");
+        let link = link.replacen(embedded, &format!("transport = {transport}"), 1);
+        let read = Rig::from_toml(&format!("{sensor}[stage]{link}")).map_err(|error| error.to_string());
+        assert_eq!(read.is_ok(), is_taken, "{transport}: {read:?}");
+        if let Err(error) = read {
+            assert!(error.starts_with("stage.transport.kind: serial or tcp"), "{error}");
+        }
+    }
+}

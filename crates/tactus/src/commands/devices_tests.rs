@@ -17,13 +17,13 @@ fn found(serial: &str, access: Access) -> FoundDevice {
     }
 }
 
-/// A rig whose sensor is the device with the serial number A1, and whose stage is a HID.
+/// A rig whose sensor is the device with the serial number A1, and whose stage is a serial port that is not there.
 fn rigs() -> Rigs {
     let embedded = "transport = { kind = \"embedded\" }";
     let transport = format!("transport = {}", found("A1", Access::Free).transport.to_toml());
     let text = SIM.replacen(embedded, &transport, 1).replacen(
         embedded,
-        "transport = { kind = \"hid\", vid = 1, pid = 2 }",
+        "transport = { kind = \"serial\", usb = { vid = 1, pid = 2 }, baud = 9600 }",
         1,
     );
     let mut rigs = Rigs { are_named: true, ..Rigs::default() };
