@@ -2,9 +2,10 @@
 
 use tactus_schema::{Frame, MonoTime};
 
-/// Rate at which the clock of a device may run slow against the computer's: oscillators without a crystal are within 1 %. A link
-/// that is too slow by less is not told from such a clock.
-const SLOW_MAX: f64 = 0.01;
+/// Rate at which the clock of a device may run slow against the computer's. A sender that is off by a quarter of a bit in the ten of a
+/// byte, 2.5 %, is not understood over an asynchronous serial line; clocks for USB have to be better. A link that is too slow by less is
+/// not told from such a clock.
+const SLOW_MAX: f64 = 0.025;
 
 /// How much later than the quickest frame of the same connection a frame arrives: it waited so long on the way.
 ///

@@ -34,7 +34,7 @@ fn a_link_that_queues_makes_frames_late_and_a_wait_that_lasts_is_not_forgotten()
         let frame = frame(1000 + 33 * u64::from(*at), 5.0 + 0.059 * f64::from(*at));
         lateness.take(&frame, LATE_MAX_S).is_some()
     });
-    assert_eq!(first_late, Some(4), "by 104 ms");
+    assert_eq!(first_late, Some(5), "by 130 ms, of which a slow clock explains 7");
     // For hours by the same time.
     for second in 0..20_000_u32 {
         let late = frame(2000 + 1000 * u64::from(second), 8.0 + f64::from(second));
@@ -46,7 +46,7 @@ fn a_link_that_queues_makes_frames_late_and_a_wait_that_lasts_is_not_forgotten()
 
 #[test]
 fn a_clock_that_drifts_for_days_makes_no_frame_late() {
-    for share in [0.991, 1.0, 1.0001, 1.01] {
+    for share in [0.976, 1.0, 1.0001, 1.025] {
         let mut lateness = of_a_clock();
         for second in 0..200_000_u32 {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some days in ms")]
