@@ -30,7 +30,8 @@ use tactus_model::{Contact, Covering};
 use crate::{
     order::median,
     placement::{Declared, across, goes_across},
-    readings::{Readings, distinct_places},
+    places::distinct_places,
+    readings::Readings,
     registration::SensorPose,
 };
 

@@ -11,6 +11,7 @@
 
 pub mod acuity;
 pub mod design;
+pub mod places;
 
 mod calibration;
 mod estimate;
@@ -30,7 +31,7 @@ pub use calibration::{Calibration, DataSummary, calibrate, health};
 pub use estimate::Estimate;
 pub use faults::{FaultKind, FaultyElement, Health};
 pub use placement::Declared;
-pub use readings::{Dwell, MeasuredPress, Readings, ReadingsBuilder, Rest, distinct_places};
+pub use readings::{Dwell, MeasuredPress, Readings, ReadingsBuilder, Rest};
 pub use registration::RegistrationFit;
 pub use response::{ElementResponse, ResponseFit, ResponseForm, Trial};
 pub use spread::SpreadFit;

@@ -9,6 +9,8 @@ use tactus_schema::table::RowView;
 
 use segment::{Segment, SegmentKind};
 
+use crate::places::distinct_places;
+
 /// Above this height nothing touches the covering, even if the declared surface is wrong.
 const CLEAR_MM: f64 = 0.3;
 /// A press that holds at least this many depths shows the response without frames in motion.
@@ -285,17 +287,6 @@ impl RestSums {
             if rests > 1.0 { squares / (rests - 1.0) / rests } else { self.squares / self.freedom.powi(2) };
         Some([mean, variance.sqrt()])
     }
-}
-
-/// Places that are at least 50 um apart, in order.
-pub fn distinct_places(places_mm: impl IntoIterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
-    let mut places: Vec<[f64; 2]> = Vec::new();
-    for [x, y] in places_mm {
-        if places.iter().all(|[other_x, other_y]| (x - other_x).hypot(y - other_y) > 0.05) {
-            places.push([x, y]);
-        }
-    }
-    places
 }
 
 /// `1 place was`, `2 places were`.

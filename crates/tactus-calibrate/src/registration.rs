@@ -25,7 +25,8 @@ use crate::{
     least_squares::{Fit, Normal, Observation, minimise},
     order::median,
     placement::{Declared, Placement, across, goes_across},
-    readings::{Dwell, MeasuredPress, Readings, distinct_places, number_of},
+    places::distinct_places,
+    readings::{Dwell, MeasuredPress, Readings, number_of},
 };
 
 /// Distinct places needed to fit the sensor's pose.

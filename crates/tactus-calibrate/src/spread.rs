@@ -21,7 +21,8 @@ use crate::{
     Estimate,
     order::median,
     placement::{Declared, coverings_mm, same_covering},
-    readings::{Dwell, MeasuredPress, Readings, distinct_places},
+    places::distinct_places,
+    readings::{Dwell, MeasuredPress, Readings},
     registration::SensorPose,
     response::{Gains, inverted},
 };

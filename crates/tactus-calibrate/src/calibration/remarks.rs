@@ -5,7 +5,8 @@ use crate::{
     Declared, Health, Readings, RegistrationFit, ResponseFit, ResponseForm, ThicknessFit,
     faults::{FaultKind, WIRING_PLACES_LEAST},
     placement::{across, goes_across},
-    readings::{distinct_places, number_of},
+    places::distinct_places,
+    readings::number_of,
     thickness::IMPLAUSIBLE,
 };
 

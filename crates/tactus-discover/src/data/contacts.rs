@@ -1,16 +1,15 @@
 //! The contacts in the data, and how they differ.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::FRAC_1_SQRT_2;
 
+use tactus_calibrate::places::{Cell, SAME_PLACE_MM, distinct_places, far};
 use tactus_model::Phase;
 
 use super::frames::Frames;
 use super::motion::{pressing, still, still_mm, stride};
 
-/// Depths, places and speeds that differ by less count as the same.
+/// Depths and speeds that differ by less count as the same.
 const SAME_DEPTH_MM: f64 = 0.03;
-const SAME_PLACE_MM: f64 = 0.05;
 const SAME_SPEED_RATIO: f64 = 1.5;
 /// The tip rests if it is at the same place after so many strides.
 const REST_STRIDES: usize = 3;
@@ -57,7 +56,7 @@ impl<'a> Contacts<'a> {
             press = press.max(frames.press[frame]);
         }
         let place = |[first, _]: &[usize; 2]| [0, 1].map(|axis| frames.position_mm[*first][axis]);
-        let places = distinct_places(spans.iter().map(place));
+        let places = distinct_places(spans.iter().map(place)).len();
         Self { frames, spans, still: still(frames), stride: stride(frames), places }
     }
 
@@ -129,7 +128,12 @@ impl<'a> Contacts<'a> {
     pub(crate) fn approaches(&self) -> bool {
         let mut cells: BTreeMap<Cell, BTreeMap<Sides, BTreeSet<[u64; 2]>>> = BTreeMap::new();
         for (place, sides) in self.spans.iter().filter_map(|[first, _]| self.from(*first)) {
-            cells.entry(cell(place)).or_default().entry(sides).or_default().insert(place.map(f64::to_bits));
+            cells
+                .entry(Cell::of(place))
+                .or_default()
+                .entry(sides)
+                .or_default()
+                .insert(place.map(f64::to_bits));
         }
         let places = |of: &BTreeSet<[u64; 2]>| -> Vec<[f64; 2]> {
             of.iter().map(|place| place.map(f64::from_bits)).collect()
@@ -138,7 +142,7 @@ impl<'a> Contacts<'a> {
             some.iter().any(|place| others.iter().any(|other| !far(*place, *other)))
         };
         cells.iter().any(|(at, of_sides)| {
-            around(*at).filter_map(|near| cells.get(&near)).any(|of_others| {
+            at.around().filter_map(|near| cells.get(&near)).any(|of_others| {
                 of_sides.iter().any(|(sides, some)| {
                     let different = of_others.iter().filter(|(others, _)| *others != sides);
                     let some = places(some);
@@ -187,38 +191,6 @@ impl<'a> Contacts<'a> {
         let [from_x, from_y, _] = before.into_iter().find(|at| far([at[0], at[1]], [x, y]))?;
         Some(([x, y], [from_x < x - SAME_PLACE_MM, from_y < y - SAME_PLACE_MM]))
     }
-}
-
-fn far([x, y]: [f64; 2], [other_x, other_y]: [f64; 2]) -> bool {
-    (x - other_x).hypot(y - other_y) > SAME_PLACE_MM
-}
-
-/// A square of the plane whose places are not far from each other.
-type Cell = [i64; 2];
-
-fn cell(place_mm: [f64; 2]) -> Cell {
-    #[expect(clippy::cast_possible_truncation, reason = "a length over a small one")]
-    let number = |at_mm: f64| (at_mm / (FRAC_1_SQRT_2 * SAME_PLACE_MM)).floor() as i64;
-    place_mm.map(number)
-}
-
-/// The cells in which places may be that are not far from those of a cell.
-fn around([x, y]: Cell) -> impl Iterator<Item = Cell> {
-    (-2..=2).flat_map(move |right| (-2..=2).map(move |up| [x.saturating_add(right), y.saturating_add(up)]))
-}
-
-/// Number of places of which each was far from all counted before it.
-fn distinct_places(places_mm: impl Iterator<Item = [f64; 2]>) -> usize {
-    let mut cells: BTreeMap<Cell, Vec<[f64; 2]>> = BTreeMap::new();
-    let mut count = 0;
-    for place in places_mm {
-        let mut near = around(cell(place)).filter_map(|near| cells.get(&near)).flatten();
-        if near.all(|other| far(place, *other)) {
-            cells.entry(cell(place)).or_default().push(place);
-            count += 1;
-        }
-    }
-    count
 }
 
 /// Number of distinct values in a sorted list.
