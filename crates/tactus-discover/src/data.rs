@@ -28,7 +28,6 @@
 //! | bins.rs | `OFTEN` | `4` | convention | what occurs less often may be scatter |
 //! | bins.rs | `JUDGED_LEAST` | `3` | derived | `PRESSES_LEAST` of `verdict/structured.rs` |
 //! | contacts.rs | `SAME_DEPTH_MM` | `0.03` | convention | what differs by less is one setting |
-//! | contacts.rs | `SAME_PLACE_MM` | `0.05` | convention | the same, of places |
 //! | contacts.rs | `SAME_SPEED_RATIO` | `1.5` | convention | the same, of speeds |
 //! | contacts.rs | `REST_STRIDES` | `3` | convention | a tenth of a second |
 //! | contacts.rs | `BACK_STRIDES` | `600` | cost | twenty seconds |
@@ -70,7 +69,6 @@
 //! | noise.rs | `DIFFERENCES_SHARE` | `2.0 / 3.0` | derived | von Neumann et al., in the comment |
 //! | noise.rs | `QUIETEST` | `0.7` | convention | below it, rounding looks the same |
 //! | noise.rs | `MEDIAN_SIZE` | `0.674_490` | derived | median of `abs` of a normal deviate |
-//! | noise.rs | `ALL_ROUNDING` | `0.9` | convention | 0.9 of the noise |
 //! | noise/repeats.rs | `PLACE_MM` | `0.02` | convention | places that differ by less are one |
 //! | noise/repeats.rs | `DEPTH_MM` | `0.005` | convention | the same, of depths |
 //! | noise/repeats.rs | `SECOND_LEAST` | `4` | convention | a second difference takes three |

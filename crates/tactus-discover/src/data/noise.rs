@@ -46,9 +46,6 @@ pub(crate) const QUIETEST: f64 = 0.7;
 /// Median absolute value of a standard normal deviate.
 const MEDIAN_SIZE: f64 = 0.674_490;
 
-/// Where rounding that repeats is this share of the noise, nothing dithers.
-const ALL_ROUNDING: f64 = 0.9;
-
 /// Statistics of the noise of readings.
 #[derive(Debug, Clone)]
 pub(crate) struct Noise {
@@ -65,10 +62,10 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// Whether a mean square of residuals, in units of the noise, may come from rounding alone. Where nothing dithers, a signal at rest is read as
-    /// the same code for all the recording: a reading is off by up to half a step, and so is the zero under it.
+    /// Whether a mean square of what a model leaves, in units of the noise, may come from rounding alone. What repeats of it is the same as long as
+    /// the signal is: a reading is off by that, and so is the zero under it.
     pub(crate) fn may_be_rounding(&self, mean_square: f64) -> bool {
-        self.rounding_share > ALL_ROUNDING && mean_square < 2.0
+        mean_square < 2.0 * self.rounding_share
     }
 
     /// The noise with the best floor that the data have. Without a floor, the noise serves as weights only.

@@ -120,6 +120,8 @@ pub enum NoDraft {
     },
     /// The fitted presses leave nothing to draft: what is left shows on the held-out presses alone.
     OnlyHeldOut,
+    /// In contact it adds no more than what rounding repeats.
+    Rounding,
     /// It acts where a name acts, and so little that it may be an error of the name's form.
     OfAName,
 }
@@ -144,6 +146,7 @@ impl NoDraft {
                 "the fitted presses leave nothing to draft: what is left shows on the held-out presses alone"
                     .into()
             }
+            Self::Rounding => "in contact it adds no more than what the converter's rounding repeats".into(),
             Self::OfAName => "it may be an error of the form of a name that acts at the same place".into(),
         }
     }

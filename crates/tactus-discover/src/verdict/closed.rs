@@ -11,6 +11,9 @@
 //!
 //! The second model's numbers have errors, as those of the truth would have: what these leave is known from the fit, and no part of `L`.
 //!
+//! A press has the weight of its readings in `L`, as it has in `E`, however few of its pairs lie that far apart. An `L` below 0 is the noise's doing: as
+//! a share it counts as 0, for the error of the share it does not.
+//!
 //! What is random from frame to frame, such as a clock that jitters, counts as left, and no model of a mean can close it. So the most that another
 //! model may close is a share of its own, in which only what lasts is left.
 //!
@@ -47,40 +50,60 @@ pub(super) fn closed(
     let of_press = |press| -> OfPress {
         let lasting = after.late_sums(press, &among);
         let ([_, before], [_, after]) = (before.sums(press, &among), after.sums(press, &among));
-        [[before[0] - after[0], after[1]], lasting, after]
+        [[before[0] - after[0], after[1]], of_readings(lasting, after[1]), after]
     };
     let presses: Vec<OfPress> = after.presses.iter().map(of_press).collect();
     let squares: Vec<Sums> = presses.iter().map(|of| of[2]).filter(|[_, count]| *count > 0.0).collect();
     let (left, error) = jackknife(&squares)?;
     let certain = left - student_95(squares.len()) * after.with_noise(left, error);
-    let share = |of: &OfPress, least_left: f64| -> Option<f64> {
+    let parts = |of: &OfPress, least_left: f64| -> Parts {
         let mean = |[sum, count]: Sums| if count > 0.0 { sum / count } else { 0.0 };
-        let (explained, left) = (mean(of[0]), (mean(of[1]).max(least_left) - of_estimates).max(0.0));
-        let all = explained + left;
-        (all > 0.0).then(|| explained / all)
+        Parts { closed: mean(of[0]), left: mean(of[1]).max(least_left) - of_estimates }
     };
-    let (whole, standard_error) = with_error(&presses, |of| share(of, certain))?;
-    let (of_lasting, error) = with_error(&presses, |of| share(of, 0.0))?;
+    let (whole, standard_error) = with_error(&presses, |of| parts(of, certain))?;
+    let (of_lasting, error) = with_error(&presses, |of| parts(of, f64::NEG_INFINITY))?;
     let most = of_lasting + MOST_ERRORS * error.unwrap_or(f64::INFINITY);
     Some(Closed { share: whole, standard_error, most })
 }
 
-/// A share of the sums over all presses, and its standard error.
-fn with_error(presses: &[OfPress], share: impl Fn(&OfPress) -> Option<f64>) -> Option<(f64, Option<f64>)> {
+/// A press's sum over pairs of readings, with the weight of its readings; none of a press without a pair.
+fn of_readings([sum, pairs]: Sums, readings: f64) -> Sums {
+    if pairs > 0.0 { [sum / pairs * readings, readings] } else { [0.0; 2] }
+}
+
+/// `E` and `L`.
+#[derive(Debug, Clone, Copy)]
+struct Parts {
+    closed: f64,
+    left: f64,
+}
+
+impl Parts {
+    /// `None` if nothing is left or closed.
+    fn share(self) -> Option<f64> {
+        let all = self.closed + self.left;
+        (all > 0.0).then(|| self.closed / all)
+    }
+}
+
+/// The share of the sums over all presses, and its standard error.
+fn with_error(presses: &[OfPress], parts: impl Fn(&OfPress) -> Parts) -> Option<(f64, Option<f64>)> {
     let mut total = OfPress::default();
     for of in presses {
         for (sums, of) in total.iter_mut().zip(of) {
             sums.iter_mut().zip(of).for_each(|(sum, of)| *sum += of);
         }
     }
-    let whole = share(&total)?;
-    let without =
-        |press: &OfPress| share(&[0, 1, 2].map(|which| [0, 1].map(|k| total[which][k] - press[which][k])));
-    let parts: Option<Vec<f64>> = presses.iter().map(without).collect();
-    let standard_error = parts.filter(|parts| parts.len() >= 3).map(|parts| {
-        let count = parts.len() as f64;
-        let mean = parts.iter().sum::<f64>() / count;
-        let spread: f64 = parts.iter().map(|one| (one - mean).powi(2)).sum();
+    let Parts { closed, left } = parts(&total);
+    let whole = Parts { closed, left: left.max(0.0) }.share()?;
+    let without = |press: &OfPress| {
+        parts(&[0, 1, 2].map(|which| [0, 1].map(|k| total[which][k] - press[which][k]))).share()
+    };
+    let shares: Option<Vec<f64>> = presses.iter().map(without).collect();
+    let standard_error = shares.filter(|shares| shares.len() >= 3).map(|shares| {
+        let count = shares.len() as f64;
+        let mean = shares.iter().sum::<f64>() / count;
+        let spread: f64 = shares.iter().map(|one| (one - mean).powi(2)).sum();
         (spread * (count - 1.0) / count).sqrt()
     });
     Some((whole, standard_error))

@@ -92,24 +92,64 @@ fn the_error_is_that_of_the_shares_without_each_press() {
     let mut draw = || f64::from(rng.random_range(1..1000_u32)) / 1000.0;
     let presses: Vec<OfPress> =
         (0..40).map(|_| [[draw(), 600.0], [0.3 * draw(), 500.0], [draw(), 600.0]]).collect();
-    let share = |of: &OfPress| {
-        let [explained, left, _] = of.map(|[sum, count]| sum / count);
-        Some(explained / (explained + left))
+    let parts = |of: &OfPress| {
+        let [closed, left, _] = of.map(|[sum, count]| sum / count);
+        Parts { closed, left }
     };
     let of_all = |presses: &[OfPress]| {
         let mut sums = OfPress::default();
         for (which, k) in (0..3).flat_map(|which| [(which, 0), (which, 1)]) {
             sums[which][k] = presses.iter().map(|press| press[which][k]).sum();
         }
-        share(&sums).unwrap()
+        let Parts { closed, left } = parts(&sums);
+        closed / (closed + left)
     };
     let without = |press: usize| of_all(&[&presses[..press], &presses[press + 1..]].concat());
-    let parts: Vec<f64> = (0..presses.len()).map(without).collect();
-    let mean = parts.iter().sum::<f64>() / 40.0;
-    let want = (parts.iter().map(|one| (one - mean).powi(2)).sum::<f64>() * 39.0 / 40.0).sqrt();
-    let (whole, error) = with_error(&presses, share).unwrap();
+    let shares: Vec<f64> = (0..presses.len()).map(without).collect();
+    let mean = shares.iter().sum::<f64>() / 40.0;
+    let want = (shares.iter().map(|one| (one - mean).powi(2)).sum::<f64>() * 39.0 / 40.0).sqrt();
+    let (whole, error) = with_error(&presses, parts).unwrap();
     assert!((whole - of_all(&presses)).abs() < 1e-12);
     assert!((error.unwrap() / want - 1.0).abs() < 1e-10, "{error:?} {want}");
+}
+
+/// Of a structure of 0.05 of the noise nothing is left, and the noise makes that seem less than nothing as often as more.
+#[test]
+fn the_error_of_a_share_of_all_is_that_of_the_noise() {
+    let shares: Vec<Closed> = (100..160).map(|seed| seen(&residuals(0.05, 1.0, seed), 1.0)).collect();
+    let whole = shares.iter().filter(|one| one.share >= 1.0).count();
+    assert!((15..45).contains(&whole), "{whole}");
+    let is_told =
+        |one: &&Closed| one.standard_error.is_none_or(|error| 1.0 - one.share < 3.0 * error && error > 0.03);
+    let told = shares.iter().filter(is_told).count();
+    assert!(told >= 55, "{told}: {shares:?}");
+}
+
+/// Long presses leave nothing, short ones all: of as many readings each.
+#[test]
+fn a_press_weighs_by_its_readings() {
+    let mut presses: Vec<Range<usize>> = (0..20).map(|press| press * 60..(press + 1) * 60).collect();
+    presses.extend((0..100).map(|press| 1200 + press * 12..1200 + (press + 1) * 12));
+    let of = |long: f32, short: f32| -> Vec<f32> {
+        (0..2400 * ELEMENTS).map(|place| if place < 1200 * ELEMENTS { long } else { short }).collect()
+    };
+    let (before, after) = (of(2.0, 2.0), of(0.0, 2.0));
+    let signal = vec![0.0; before.len()];
+    let noise = [1e-6; ELEMENTS];
+    let readings = |residual| Readings {
+        elements: ELEMENTS,
+        residual,
+        signal: &signal,
+        presses: &presses,
+        noise_counts: &noise,
+        unit_counts: &[1.0; ELEMENTS],
+        lag: 1,
+        correlation: 0.0,
+        rounding_share: 0.0,
+        freedom: 500.0,
+    };
+    let Closed { share, .. } = closed([&readings(&before), &readings(&after)], 0.0, |_| true).unwrap();
+    assert!((share - 0.5).abs() < 1e-6, "{share}");
 }
 
 /// As many as there are frames in a recording of presses of one frame each.
@@ -117,6 +157,7 @@ fn the_error_is_that_of_the_shares_without_each_press() {
 fn the_error_of_many_presses_takes_no_time() {
     let presses: Vec<OfPress> =
         (0..300_000).map(|press| [[f64::from(press % 7), 48.0], [1.0, 48.0], [1.0, 48.0]]).collect();
-    let (_, error) = with_error(&presses, |of| Some(of[0][0] / (of[0][0] + of[1][0]))).unwrap();
+    let parts = |of: &OfPress| Parts { closed: of[0][0], left: of[1][0] };
+    let (_, error) = with_error(&presses, parts).unwrap();
     assert!(error.is_some_and(|error| error > 0.0 && error < 1e-2), "{error:?}");
 }

@@ -102,6 +102,10 @@ pub(super) fn drafted(
         closed.extend(added.map(|term| term.definition.stage()));
     }
     let found = match search.draft(grown, &name, alpha, against, &closed)? {
+        Ok(found) if repeats_of_rounding(prepared, grown, &found.at) => Err(NoDraft::Rounding),
+        found => found,
+    };
+    let found = match found {
         Ok(found) => found,
         Err(why) => return Ok(is_open(verdict).then_some(Err(why))),
     };
@@ -116,6 +120,25 @@ pub(super) fn drafted(
         return Ok(None);
     }
     Ok(describing(prepared, grown, found, floor)?.ok().map(Ok))
+}
+
+/// True if a draft may be what repeats of rounding: in contact it changes a model by no more.
+fn repeats_of_rounding(prepared: &Prepared<'_>, without: &Fitted, with: &Fitted) -> bool {
+    let (bins, noise) = (&prepared.bins, &prepared.noise);
+    let mut sums = [0.0; 2];
+    let predictions =
+        without.predicted.chunks_exact(bins.elements).zip(with.predicted.chunks_exact(bins.elements));
+    for (bin, (without, with)) in
+        predictions.enumerate().filter(|(bin, _)| !bins.is_clear(prepared.frames, *bin))
+    {
+        let more =
+            without.iter().zip(with).zip(&noise.by_element_counts).filter(|(_, noise)| noise.is_finite());
+        for ((without, with), noise) in more {
+            sums[0] += bins.weight[bin] * ((with - without) / noise).powi(2);
+            sums[1] += bins.weight[bin];
+        }
+    }
+    sums[1] > 0.0 && noise.may_be_rounding(sums[0] / sums[1])
 }
 
 /// A draft, if it closes the better part of what a model leaves, as folds of the fitted presses tell. They tell nothing of a model with a
