@@ -94,7 +94,6 @@
 //! | hold.rs | `EXCHANGES_MAX` | `4` | cost | of rounds; 3 at first |
 //! | hold.rs | `HARDLY_ANYTHING` | `0.25` | convention | half of the rms (decision 0055) |
 //! | hold.rs | `OTHERS_MAX` | `4` | cost | of fits |
-//! | hold.rs | `BLOCKS_Z` | `2.0` | convention | two standard errors |
 //! | hold.rs | `SET_PROBABILITY` | `0.95` | convention | the 95 % of issue 19 |
 //! | hold.rs | `SET_UNITS` | `3.0` | derived | `exp(-3)` is 5 % |
 //! | jumps.rs | `CELLS` | `1024` | cost | of a place |

@@ -52,18 +52,8 @@ impl Problem<'_> {
 
     /// By how much `more` is nearer to the held-out bins than `less`, block by block.
     pub(crate) fn heldout_gains(&self, less: &[f64], more: &[f64]) -> Vec<f64> {
-        gains(&self.heldout_blocks(less), &self.heldout_blocks(more))
-    }
-
-    /// By how much `more` is nearer to the held-out bins than `less`, and its standard error from the scatter of blocks.
-    pub(crate) fn heldout_gain(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
-        gain(&self.heldout_blocks(&less.predicted), &self.heldout_blocks(&more.predicted))
-    }
-
-    /// The same of the fitted bins.
-    pub(crate) fn fitted_gain(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
-        let of = |fitted: &Fitted| self.blocks_of(&fitted.predicted, |bin| self.train[bin] > 0.0);
-        gain(&of(less), &of(more))
+        let both = self.heldout_blocks(less).into_iter().zip(self.heldout_blocks(more));
+        both.map(|([less, _], [more, _])| less - more).collect()
     }
 
     /// By how much `more` is nearer to the fitted bins than `less`, in every other block and in the others.
@@ -120,19 +110,4 @@ impl Problem<'_> {
         let variance: f64 = blocks.iter().map(|[_, readings]| 2.0 * readings).sum();
         HeldOutGap { value, error: variance.sqrt() }
     }
-}
-
-fn gains(less: &[[f64; 2]], more: &[[f64; 2]]) -> Vec<f64> {
-    less.iter().zip(more).map(|([less, _], [more, _])| less - more).collect()
-}
-
-/// The sum of gains, and its standard error from the scatter of blocks.
-fn gain(less: &[[f64; 2]], more: &[[f64; 2]]) -> [f64; 2] {
-    let gains = gains(less, more);
-    let sum: f64 = gains.iter().sum();
-    let blocks = less.iter().filter(|[_, readings]| *readings > 0.0).count().max(1) as f64;
-    let scatter: f64 = gains.iter().map(|gain| gain * gain).sum::<f64>() - sum * sum / blocks;
-    // A gain in a single block counts fully, so the error is at most that of the difference of two predictions.
-    let noise = 4.0 * sum.abs();
-    [sum, scatter.max(0.0).min(noise).sqrt()]
 }

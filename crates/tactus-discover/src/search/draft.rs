@@ -348,7 +348,7 @@ impl Search<'_> {
             return Ok(Err(NoDraft::Class(class)));
         }
         let atom = field.weighed[best].atom.clone();
-        let Some(AsEffect { draft, at: with, covariance, knots, unseen_gains }) =
+        let Some((AsEffect { draft, at: with, covariance, knots }, unseen_gains)) =
             self.as_effect(at, sight, atom, field.count, name)?
         else {
             return Ok(Err(NoDraft::NoGain));

@@ -25,8 +25,6 @@ const EXCHANGES_MAX: usize = 4;
 const HARDLY_ANYTHING: f64 = 0.25;
 /// Greatest number of other classes that are fitted in a class's place.
 const OTHERS_MAX: usize = 4;
-/// A class must gain so many standard errors, from the scatter of blocks.
-const BLOCKS_Z: f64 = 2.0;
 /// Probability of a reported set of classes.
 pub const SET_PROBABILITY: f64 = 0.95;
 /// By how many units a class at the end of such a set is behind the best.
@@ -56,8 +54,7 @@ impl Search<'_> {
             let lesses: Vec<Fitted> =
                 parallel::map(&names, without).into_iter().collect::<Result<_, DiscoverError>>()?;
             let odds: Vec<f64> = lesses.iter().map(|less| self.ln_odds(less, &grown.at)).collect();
-            let worth = |(index, less): (usize, &Fitted)| self.worth(&grown.at, less, index, &names, &odds);
-            let worths: Vec<f64> = lesses.iter().enumerate().map(worth).collect();
+            let worths: Vec<f64> = (0..names.len()).map(|index| Self::worth(index, &names, &odds)).collect();
             let weakest = worths.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
             if let Some((weakest, _)) = weakest.filter(|(_, worth)| **worth < 1.0) {
                 grown.refused.push(self.too_small(names[weakest], odds[weakest], &grown.at));
@@ -162,23 +159,13 @@ impl Search<'_> {
         }
     }
 
-    /// What a class gains over the least gain with which it holds its place: from 1 on it does. What is small beside the
-    /// gain of another class may be that one's form, and blocks must agree.
-    fn worth(&self, at: &Fitted, less: &Fitted, index: usize, names: &[&'static str], odds: &[f64]) -> f64 {
-        let others = names
-            .iter()
-            .zip(odds)
-            .enumerate()
-            .filter(|(other, (name, _))| *other != index && !is_exact(name));
+    /// The odds of a class over the least with which it holds its place: from 1 on it does. What is small beside the odds of another class may be
+    /// that one's form.
+    fn worth(index: usize, names: &[&'static str], odds: &[f64]) -> f64 {
+        let others = names.iter().zip(odds).enumerate();
+        let others = others.filter(|(other, (name, _))| *other != index && !is_exact(name));
         let strongest = others.map(|(_, (_, odds))| *odds).fold(0.0, f64::max);
-        let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
-        let by_odds = odds[index] / least;
-        if [at, less].iter().any(|one| one.parameters.walk.is_some()) {
-            // A walk fits the noise of the blocks too.
-            return by_odds;
-        }
-        let [gain, error] = self.problem.fitted_gain(less, at);
-        by_odds.min(gain / (BLOCKS_Z * error).max(f64::MIN_POSITIVE))
+        odds[index] / LN_ODDS_LEAST.max(FORM_SHARE * strongest)
     }
 
     /// True if a class explains little beside a draft: a model that has both is hardly nearer than one with the draft that is made without it.

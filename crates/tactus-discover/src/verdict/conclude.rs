@@ -355,7 +355,7 @@ impl Search<'_> {
     }
 
     fn share_of(&self, base: &Fitted, grown: &Fitted, left: f64) -> f64 {
-        let [closed, _] = self.problem.heldout_gain(base, grown);
+        let closed: f64 = self.problem.heldout_gains(&base.predicted, &grown.predicted).iter().sum();
         if closed + left > 0.0 { (left / (closed + left)).clamp(0.0, 1.0) } else { 1.0 }
     }
 

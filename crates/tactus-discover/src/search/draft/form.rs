@@ -35,14 +35,14 @@ pub(super) struct AsEffect {
     pub(super) at: Fitted,
     pub(super) covariance: Vec<Vec<f64>>,
     pub(super) knots: Vec<[f64; 3]>,
-    pub(super) unseen_gains: Vec<f64>,
 }
 
 /// Something that a form gains, as the logarithm of its odds.
 type Gained<T> = Option<(f64, T)>;
 
 impl Search<'_> {
-    /// An atom, which was the best of so many, as an effect; `None` if that gains nothing.
+    /// An atom, which was the best of so many, as an effect, and by how much it is nearer to presses that its numbers have not seen, block by block;
+    /// `None` if it gains nothing.
     pub(super) fn as_effect(
         &self,
         at: &Fitted,
@@ -50,17 +50,16 @@ impl Search<'_> {
         atom: Atom,
         among: f64,
         name: &str,
-    ) -> Result<Option<AsEffect>, DiscoverError> {
+    ) -> Result<Option<(AsEffect, Vec<f64>)>, DiscoverError> {
         let atom = self.with_form(at, sight, atom, among)?;
         let Some(first) = self.in_form(at, sight, &atom, name, at.cost)? else { return Ok(None) };
+        // Beside the model without it as that was fitted.
+        let unseen_gains = self.unseen_gains_of(at, sight, &atom)?;
         let without = self.without_last(&first.at)?;
         let sight = Arc::new(Sight::of(self.problem, &without)?);
         let atom = grammar::picked_anew(atom, self.problem, &without, &sight);
-        Ok(Some(match self.in_form(&without, &sight, &atom, name, first.at.cost)? {
-            // What it gains on unseen presses is beside the model without it as it was fitted.
-            Some(again) => AsEffect { unseen_gains: first.unseen_gains, ..again },
-            None => first,
-        }))
+        let again = self.in_form(&without, &sight, &atom, name, first.at.cost)?;
+        Ok(Some((again.unwrap_or(first), unseen_gains)))
     }
 
     /// The atom with the knots, the weights and the second covariate that the data show.
@@ -189,7 +188,17 @@ impl Search<'_> {
     /// The coefficients of an atom's columns with the greatest posterior probability.
     fn curve(&self, at: &Fitted, sight: &Arc<Sight>, atom: &Atom) -> Result<Curve, DiscoverError> {
         let (additions, grams) = self.alone(at, sight, atom)?;
-        Ok(self.curve_of(&additions, &grams))
+        let evidence = self.evidence_of(&additions, grams.reduced());
+        let set = evidence.set([0]);
+        let found: BTreeMap<usize, f64> = evidence.coefficients(&set).into_iter().collect();
+        let directions = &additions[0].directions;
+        let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
+        let product = |i: usize, j: usize| grams.reduced()[(directions[i], directions[j])];
+        Ok(Curve {
+            values: DVector::from_iterator(directions.len(), directions.iter().map(value)),
+            gram: DMatrix::from_fn(directions.len(), directions.len(), product) / self.problem.variance,
+            determined: evidence.determined(&set),
+        })
     }
 
     /// An atom as the only addition, with its products.
@@ -203,18 +212,21 @@ impl Search<'_> {
         Ok((additions(&weighed, &grams, 1.0), grams))
     }
 
-    fn curve_of(&self, additions: &[Addition], grams: &Grams) -> Curve {
-        let evidence = self.evidence_of(additions, grams.reduced());
-        let set = evidence.set([0]);
-        let found: BTreeMap<usize, f64> = evidence.coefficients(&set).into_iter().collect();
-        let directions = &additions[0].directions;
-        let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
-        let product = |i: usize, j: usize| grams.reduced()[(directions[i], directions[j])];
-        Curve {
-            values: DVector::from_iterator(directions.len(), directions.iter().map(value)),
-            gram: DMatrix::from_fn(directions.len(), directions.len(), product) / self.problem.variance,
-            determined: evidence.determined(&set),
-        }
+    /// By how much an atom that is fitted to the other folds is nearer to the presses of each, block by block. Weights of the elements are fitted, too:
+    /// those that were found with all presses gain something in any noise.
+    fn unseen_gains_of(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        atom: &Atom,
+    ) -> Result<Vec<f64>, DiscoverError> {
+        let shared = if atom.weights.is_some() { self.curve(at, sight, atom)?.shared() } else { None };
+        let atom = match shared {
+            Some(shared) => Atom { weights: None, of_elements: true, curve: Some(shared), ..atom.clone() },
+            None => atom.clone(),
+        };
+        let (additions, grams) = self.alone(at, sight, &atom)?;
+        Ok(self.unseen_gains(&grams, &additions, &[0]))
     }
 
     /// By how much additions that are fitted to the other folds are nearer to the presses of each, block by block.
@@ -243,15 +255,13 @@ impl Search<'_> {
         name: &str,
         cost: f64,
     ) -> Result<Option<AsEffect>, DiscoverError> {
-        let (additions, grams) = self.alone(at, sight, atom)?;
-        let curve = self.curve_of(&additions, &grams);
+        let curve = self.curve(at, sight, atom)?;
         let reduced = curves::reduced(atom, &curve, missed(0.5 * curve.squares()));
         let draft = words::named(sight, atom, reduced.law, name);
         Ok(self.taken(at, draft, cost)?.map(|(draft, fitted, by)| AsEffect {
             draft,
             at: fitted,
             covariance: scaled(reduced.covariance, by * by),
-            unseen_gains: self.unseen_gains(&grams, &additions, &[0]),
             knots: reduced.knots.into_iter().map(|[at, value, error]| [at, by * value, by * error]).collect(),
         }))
     }
@@ -334,3 +344,7 @@ fn missed(explained: f64) -> f64 {
 fn scaled(rows: Vec<Vec<f64>>, by: f64) -> Vec<Vec<f64>> {
     rows.into_iter().map(|row| row.into_iter().map(|value| by * value).collect()).collect()
 }
+
+#[cfg(test)]
+#[path = "form_tests.rs"]
+mod tests;
