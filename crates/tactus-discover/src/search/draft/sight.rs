@@ -59,8 +59,13 @@ impl Sight {
             take(bins.t_s[bin], tactus_model::Path::at(&bins.paths[bins.run[bin]], bins.t_s[bin]));
             traces.push(trace.clone());
         }
-        let mut signal_mm = Vec::with_capacity(at.predicted.len());
-        for (bin, counts) in at.predicted.chunks_exact(elements).enumerate() {
+        // A walk of the zeros is no part of what a pipeline has.
+        let mut counts = at.predicted.clone();
+        if let Some(walk) = &at.parameters.walk {
+            walk.add(bins, -1.0, &mut counts);
+        }
+        let mut signal_mm = Vec::with_capacity(counts.len());
+        for (bin, counts) in counts.chunks_exact(elements).enumerate() {
             let run = bins.run[bin];
             for (element, counts) in counts.iter().enumerate() {
                 let gain = at.parameters.sensitivity[element] * at.parameters.run_gain[run];
@@ -72,7 +77,7 @@ impl Sight {
             elements,
             traces,
             signal_mm,
-            counts: at.predicted.clone(),
+            counts,
             array: known.array.clone(),
             interval_s: interval_s(frames),
             units: Vec::new(),
@@ -336,3 +341,7 @@ impl Atom {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "sight_tests.rs"]
+mod tests;
