@@ -209,7 +209,7 @@ impl ServiceConfig {
         if let Some(folder) = experiments.clone().filter(|folder| !folder.is_dir()) {
             return Err(ConfigError::Experiments { path: path.to_owned(), folder });
         }
-        let state = std::env::var_os("STATE_DIRECTORY").map(PathBuf::from).unwrap_or_default();
+        let state = crate::state::of_service().unwrap_or_default();
         let bus = raw.bus.beside(folder);
         Ok(Self { rigs, experiments, recordings: state.join(raw.recordings), bus, log: raw.log })
     }

@@ -1,12 +1,15 @@
-//! The covering in place, kept in a file beyond the end of the service. It is not among the recordings: people move those.
+//! The covering in place, kept in a file beyond the end of the service: among the recordings, and in the state directory, because people move
+//! recordings.
 
-use std::env;
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tactus_engine::CoveringMemory;
+use tactus_schema::Rig;
+
+use crate::state;
 
 /// Format of the file, in its key `schema`.
 const SCHEMA: &str = "tactus.covering/1";
@@ -14,12 +17,11 @@ const SCHEMA: &str = "tactus.covering/1";
 /// The files' folder in the state directory.
 const FOLDER: &str = "coverings";
 
-/// A TOML file that holds the thickness of the covering in place.
+/// A TOML file that holds the thickness of the covering in place, and perhaps a copy of it. The thinner of the two counts.
 #[derive(Debug, Clone)]
 pub struct CoveringFile {
     path: PathBuf,
-    /// Where an earlier version kept it. It counts as long as there is no file at `path`.
-    earlier: Option<PathBuf>,
+    copy: Option<PathBuf>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -32,31 +34,30 @@ struct Content {
 impl CoveringFile {
     /// The file of a rig, in a folder.
     pub fn of(rig: &str, folder: &Path) -> Self {
-        Self { path: folder.join(name(rig)), earlier: None }
+        Self { path: folder.join(format!("{rig}.covering.toml")), copy: None }
     }
 
-    /// The file of a rig in `coverings` in the state directory: `$STATE_DIRECTORY` of a service, else `$XDG_STATE_HOME/tactus`, else
-    /// `~/.local/state/tactus`. Without any it is in the folder of the recordings, where earlier versions kept it.
-    pub fn in_state(rig: &str, recordings: &Path) -> Self {
-        let of = |variable: &str| env::var_os(variable).filter(|value| !value.is_empty()).map(PathBuf::from);
-        let of_user = || of("XDG_STATE_HOME").map(|state| state.join("tactus"));
-        let of_home = || of("HOME").map(|home| home.join(".local/state/tactus"));
-        match of("STATE_DIRECTORY").or_else(of_user).or_else(of_home) {
-            Some(state) => Self::of(rig, &state.join(FOLDER)).moved_from(recordings),
-            None => Self::of(rig, recordings),
+    /// The same with a copy in another folder, if there is one.
+    #[must_use]
+    pub fn with_copy(self, folder: Option<&Path>) -> Self {
+        let copy = folder.zip(self.path.file_name()).map(|(folder, name)| folder.join(name));
+        Self { copy: copy.filter(|copy| *copy != self.path), ..self }
+    }
+
+    /// The file of a rig among its recordings, with a copy in `coverings` in the [state directory](state::folder). That of a simulated rig has none: it
+    /// may have the name of a real one.
+    pub fn of_rig(rig: &Rig, recordings: &Path) -> Self {
+        let state = state::folder().filter(|_| !rig.simulated).map(|state| state.join(FOLDER));
+        Self::of(&rig.name, recordings).with_copy(state.as_deref())
+    }
+
+    fn write_copy(&self, thickness_mm: f64) {
+        let Some(copy) = &self.copy else { return };
+        if let Err(error) = write(copy, thickness_mm) {
+            let path = copy.display();
+            tracing::warn!(%path, %error, "the covering in place is remembered among the recordings alone");
         }
     }
-
-    /// The same file, which an earlier version kept in another folder.
-    #[must_use]
-    pub fn moved_from(self, folder: &Path) -> Self {
-        let earlier = self.path.file_name().map(|name| folder.join(name));
-        Self { earlier, ..self }
-    }
-}
-
-fn name(rig: &str) -> String {
-    format!("{rig}.covering.toml")
 }
 
 fn invalid(path: &Path, why: impl std::fmt::Display) -> io::Error {
@@ -67,7 +68,9 @@ fn invalid(path: &Path, why: impl std::fmt::Display) -> io::Error {
 fn read(path: &Path) -> io::Result<Option<f64>> {
     let text = match fs::read_to_string(path) {
         Ok(text) => text,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+            return Ok(None);
+        }
         Err(error) => return Err(io::Error::new(error.kind(), format!("{}: {error}", path.display()))),
     };
     let content: Content = toml::from_str(&text).map_err(|error| invalid(path, error))?;
@@ -77,31 +80,35 @@ fn read(path: &Path) -> io::Result<Option<f64>> {
     Ok(Some(content.thickness_mm))
 }
 
+/// Writes another file and renames it: a crash leaves the old thickness or the new one.
+fn write(path: &Path, thickness_mm: f64) -> io::Result<()> {
+    let content = Content { schema: SCHEMA.into(), thickness_mm };
+    let text = toml::to_string(&content).map_err(|error| invalid(path, error))?;
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let new = path.with_extension("toml.new");
+    let mut file = File::create(&new)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()?;
+    fs::rename(&new, path)?;
+    File::open(folder)?.sync_all()
+}
+
 impl CoveringMemory for CoveringFile {
-    /// What only an earlier version's place holds is remembered here, before somebody moves that.
+    /// What only the file has is copied, before somebody moves that.
     fn recall(&self) -> io::Result<Option<f64>> {
-        if let Some(thickness_mm) = read(&self.path)? {
-            return Ok(Some(thickness_mm));
+        let [own_mm, copy_mm] = [read(&self.path)?, self.copy.as_deref().map_or(Ok(None), read)?];
+        let Some(own_mm) = own_mm else { return Ok(copy_mm) };
+        if copy_mm.is_none() {
+            self.write_copy(own_mm);
         }
-        let earlier_mm = self.earlier.as_deref().map_or(Ok(None), read)?;
-        if let Some(thickness_mm) = earlier_mm {
-            self.remember(thickness_mm)?;
-        }
-        Ok(earlier_mm)
+        Ok(Some(copy_mm.map_or(own_mm, |copy_mm| copy_mm.min(own_mm))))
     }
 
-    /// Writes another file and renames it: a crash leaves the old thickness or the new one.
     fn remember(&self, thickness_mm: f64) -> io::Result<()> {
-        let content = Content { schema: SCHEMA.into(), thickness_mm };
-        let text = toml::to_string(&content).map_err(|error| invalid(&self.path, error))?;
-        let folder = self.path.parent().unwrap_or(Path::new("."));
-        fs::create_dir_all(folder)?;
-        let new = self.path.with_extension("toml.new");
-        let mut file = File::create(&new)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        fs::rename(&new, &self.path)?;
-        File::open(folder)?.sync_all()
+        write(&self.path, thickness_mm)?;
+        self.write_copy(thickness_mm);
+        Ok(())
     }
 }
 

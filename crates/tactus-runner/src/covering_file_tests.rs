@@ -20,27 +20,40 @@ fn a_thickness_is_kept_and_a_damaged_file_is_an_error() {
 fn a_covering_is_kept_although_the_folder_of_recordings_is_another_one() {
     let folder = tempfile::tempdir().unwrap();
     let (state, runs) = (folder.path().join("state"), folder.path().join("runs"));
-    CoveringFile::of("lab", &state).moved_from(&runs).remember(1.016).unwrap();
-    fs::create_dir_all(&runs).unwrap();
+    CoveringFile::of("lab", &runs).with_copy(Some(&state)).remember(1.016).unwrap();
     fs::rename(&runs, folder.path().join("runs-2026")).unwrap();
     for recordings in [runs, folder.path().join("elsewhere")] {
-        let file = CoveringFile::of("lab", &state).moved_from(&recordings);
+        let file = CoveringFile::of("lab", &recordings).with_copy(Some(&state));
         assert_eq!(file.recall().unwrap(), Some(1.016));
     }
 }
 
 #[test]
-fn a_covering_that_an_earlier_version_kept_among_the_recordings_counts_and_is_kept_from_then_on() {
+fn a_covering_without_a_copy_is_copied_and_of_two_the_thinner_counts() {
     let folder = tempfile::tempdir().unwrap();
     let (state, runs) = (folder.path().join("state"), folder.path().join("runs"));
     CoveringFile::of("lab", &runs).remember(1.016).unwrap();
-    let file = CoveringFile::of("lab", &state).moved_from(&runs);
+    let file = CoveringFile::of("lab", &runs).with_copy(Some(&state));
     assert_eq!(file.recall().unwrap(), Some(1.016));
     fs::remove_dir_all(&runs).unwrap();
     assert_eq!(file.recall().unwrap(), Some(1.016));
-    // Of two, the newer counts.
-    CoveringFile::of("lab", &runs).remember(3.0).unwrap();
-    assert_eq!(file.recall().unwrap(), Some(1.016));
-    fs::write(folder.path().join("state/lab.covering.toml"), "").unwrap();
-    assert!(file.recall().is_err(), "a damaged file is not replaced by an old one");
+    for (own_mm, copy_mm) in [(3.0, 1.016), (1.016, 3.0)] {
+        CoveringFile::of("lab", &runs).remember(own_mm).unwrap();
+        CoveringFile::of("lab", &state).remember(copy_mm).unwrap();
+        assert_eq!(file.recall().unwrap(), Some(1.016));
+    }
+    fs::write(state.join("lab.covering.toml"), "").unwrap();
+    assert!(file.recall().is_err(), "a damaged file is not replaced by the other one");
+}
+
+#[test]
+fn a_state_directory_that_cannot_be_written_costs_the_copy_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (state, runs) = (folder.path().join("state"), folder.path().join("runs"));
+    fs::write(&state, "no folder").unwrap();
+    let file = CoveringFile::of("lab", &runs).with_copy(Some(&state.join("coverings")));
+    for thickness_mm in [1.016, 2.54] {
+        file.remember(thickness_mm).unwrap();
+        assert_eq!(file.recall().unwrap(), Some(thickness_mm));
+    }
 }

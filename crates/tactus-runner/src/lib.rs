@@ -15,6 +15,7 @@
 //! | [`twin`] | the dry run on a simulated twin |
 //! | [`rehearsal`] | a dry run that keeps what a run would record |
 //! | [`embedded`] | one run in this process, without a service |
+//! | [`state`] | the state directory |
 //! | [`stage_check`] | a check of a rig's stage alone: its identity, and whether it moves as it reports |
 
 pub mod config;
@@ -31,6 +32,7 @@ pub mod rehearsal;
 pub mod script_process;
 pub mod signals;
 pub mod stage_check;
+pub mod state;
 pub mod twin;
 
 mod outline;

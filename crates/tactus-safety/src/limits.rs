@@ -15,8 +15,8 @@ pub const SAME_HEIGHT_MM: f64 = 0.0003;
 /// Sample periods without a frame after which a tip near the covering is stopped.
 const SILENT_PERIODS_MAX: f64 = 3.0;
 
-/// Greatest age of the report that a step down starts from. Drivers ask a standing stage every 0.1 s, and again 0.25 s after
-/// a question that was not answered.
+/// Greatest age of the report that a step down starts from. Drivers ask a standing stage every 0.1 s, and again 0.25 s after a question that
+/// was not answered. Where a report of Grbl is missing, the next question waits for half a second, and a step for its answer.
 pub(crate) const REPORT_AGE_MAX_S: f64 = 0.5;
 
 /// Shortest of the supervisor's times. Links deliver in batches of up to 16 ms and timers are coarse: three periods of a sensor of

@@ -64,6 +64,12 @@ pub enum Denied {
     /// The supervisor has seen no recent frame.
     #[error("the last frame is {age_s:.3} s old; a step down needs one of the last {limit_s:.3} s")]
     NoFreshFrame { age_s: f64, limit_s: f64 },
+    /// Frames arrive, and wait too long on their way.
+    #[error(
+        "frames arrive {late_s:.1} s late by the sensor's own clock: its link or this computer is too slow, or its clock stood still or goes \
+         wrong; a new connection begins anew (unplug the sensor for a moment, or restart the service)"
+    )]
+    LateFrames { late_s: f64 },
     /// The last report of the stage is old.
     #[error("the stage's last report is {age_s:.3} s old; a step down needs one of the last {limit_s:.3} s")]
     NoFreshReport { age_s: f64, limit_s: f64 },
@@ -105,7 +111,13 @@ pub enum Denied {
 impl Denied {
     /// True if a later try may be permitted without anything else changing: the next frame or report may cure it.
     pub fn may_pass(&self) -> bool {
-        matches!(self, Self::NoFreshFrame { .. } | Self::NoFreshReport { .. } | Self::NotStanding { .. })
+        matches!(
+            self,
+            Self::NoFreshFrame { .. }
+                | Self::LateFrames { .. }
+                | Self::NoFreshReport { .. }
+                | Self::NotStanding { .. }
+        )
     }
 }
 

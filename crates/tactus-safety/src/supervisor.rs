@@ -260,7 +260,9 @@ impl Supervisor {
     /// Latches a fault until the next reset. An earlier one is kept, because it is the cause, unless this one is worse.
     pub fn latch(&mut self, fault: Fault) {
         self.permits.revoke();
-        if self.fault.as_ref().is_none_or(|known| known.rank() < fault.rank()) {
+        // A reset that finds the stage somewhere has not finished, if that was away since.
+        let ends_reset = fault == Fault::Away && self.fault == Some(Fault::Unfinished);
+        if ends_reset || self.fault.as_ref().is_none_or(|known| known.rank() < fault.rank()) {
             self.fault = Some(fault);
         }
     }
@@ -337,7 +339,11 @@ impl Supervisor {
     fn check_frame(&self, now: MonoTime) -> Result<(), Denied> {
         let (age_s, limit_s) =
             (Limits::silence_s(now, self.elements.last_frame()), self.limits.silence_max_s());
-        if age_s <= limit_s { Ok(()) } else { Err(Denied::NoFreshFrame { age_s, limit_s }) }
+        if age_s <= limit_s { Ok(()) } else { Err(self.no_fresh_frame(age_s, limit_s)) }
+    }
+
+    fn no_fresh_frame(&self, age_s: f64, limit_s: f64) -> Denied {
+        self.late_s.map_or(Denied::NoFreshFrame { age_s, limit_s }, |late_s| Denied::LateFrames { late_s })
     }
 
     fn check_report(&self, now: MonoTime) -> Result<(), Denied> {
@@ -354,7 +360,7 @@ impl Supervisor {
             return Ok(());
         }
         let age_s = Limits::silence_s(now, self.elements.last_frame());
-        Err(Denied::NoFreshFrame { age_s, limit_s: 0.0 })
+        Err(self.no_fresh_frame(age_s, 0.0))
     }
 
     fn expiry(&self, now: MonoTime) -> MonoTime {

@@ -595,6 +595,11 @@ fn a_stage_that_was_away_may_go_up_and_nothing_else_before_a_reset() {
     supervisor.begin_reset(at_ms(1010));
     supervisor.finish_reset(at_ms(1010)).unwrap();
     assert_eq!(supervisor.fault(), None);
+    // Away during a reset: the place is not that which the homing found.
+    supervisor.begin_reset(at_ms(1010));
+    supervisor.on_report(&away);
+    supervisor.on_report(&standing(2.0));
+    assert_eq!(supervisor.finish_reset(at_ms(1010)), Err(Denied::Fault(Fault::Away)));
 }
 
 #[test]
@@ -613,6 +618,9 @@ fn frames_that_a_link_keeps_back_are_not_fresh() {
     }
     assert!(matches!(violation, Some(Violation::Silence { .. })), "{violation:?}");
     assert!(supervisor.late_s().is_some_and(|late_s| late_s > 0.25));
+    supervisor.begin_reset(at_ms(1700));
+    let refused = supervisor.finish_reset(at_ms(2000)).unwrap_err();
+    assert!(matches!(refused, Denied::LateFrames { .. }) && refused.may_pass(), "{refused}");
     // They still show a load.
     let loaded = Frame { counts: [3000.0; 48].into(), ..sampled_ms(400, 1720) };
     assert!(matches!(

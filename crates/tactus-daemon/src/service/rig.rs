@@ -181,7 +181,7 @@ impl Rig {
         let mut opened = (service.open)(&rig, &rig_service, codec, &truth, clock);
         if opened.devices.change_covering.is_none() {
             // A person changes the covering, and may do so while the service is down.
-            opened.devices.covering_memory = Some(Arc::new(CoveringFile::in_state(&rig.name, &recordings)));
+            opened.devices.covering_memory = Some(Arc::new(CoveringFile::of_rig(&rig, &recordings)));
         }
         let publisher = self.bus.publisher();
         let engine = Engine::start(rig, opened.devices, clock, Arc::new(BusPublisher(publisher.clone())))?;

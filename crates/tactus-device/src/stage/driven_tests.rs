@@ -265,7 +265,9 @@ async fn a_stage_that_falls_silent_is_held_and_found_again() {
     assert!(matches!(stage.move_to(permit(to(2.0, 10.0))).await, Err(StageError::Device(_))));
     // It stands on its way, and has not been reset by others.
     let epoch = stage.state().borrow().epoch;
-    until(&stage, StageStatus::Idle).await;
+    let mut state = stage.state();
+    let first = state.wait_for(|state| state.status() != StageStatus::Disconnected).await.unwrap().status();
+    assert_eq!(first, StageStatus::Idle, "not a place that is not known yet");
     assert!(stage.state().borrow().epoch > epoch, "no dwell outlasts it");
     stage.move_to(permit(to(2.0, 10.0))).await.unwrap();
 }

@@ -373,7 +373,11 @@ where
         checked
     }
 
+    /// Publishes a report of a stage that is connected. What one says while it is greeted is not told: whether it knows its place is not known yet.
     fn report(&mut self, now: TimeStamp, report: Report) {
+        if !self.progress.connected {
+            return;
+        }
         let status = match report.status {
             Status::Unhomed => pb::StageStatus::Unhomed,
             Status::Idle => pb::StageStatus::Idle,

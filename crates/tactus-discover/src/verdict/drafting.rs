@@ -1,7 +1,7 @@
 //! The draft of what a grown model leaves, and how much of it that closes on the held-out presses, which had no say in it.
 
 use tactus_model::Effect;
-use tactus_model::effect::{Definition, Draft};
+use tactus_model::effect::{Definition, Draft, When};
 
 use super::closed::{Closed, MOST_ERRORS};
 use super::discovery::{BaseModel, Verdict};
@@ -102,7 +102,7 @@ pub(super) fn drafted(
         closed.extend(added.map(|term| term.definition.stage()));
     }
     let found = match search.draft(grown, &name, alpha, against, &closed)? {
-        Ok(found) if repeats_of_rounding(prepared, grown, &found.at) => Err(NoDraft::Rounding),
+        Ok(found) if repeats_of_rounding(prepared, grown, &found) => Err(NoDraft::Rounding),
         found => found,
     };
     let found = match found {
@@ -122,23 +122,19 @@ pub(super) fn drafted(
     Ok(describing(prepared, grown, found, floor)?.ok().map(Ok))
 }
 
-/// True if a draft may be what repeats of rounding: in contact it changes a model by no more.
-fn repeats_of_rounding(prepared: &Prepared<'_>, without: &Fitted, with: &Fitted) -> bool {
+/// True if a draft may be what repeats of rounding: it acts in contact alone, and changes a model there by no more.
+fn repeats_of_rounding(prepared: &Prepared<'_>, without: &Fitted, found: &Drafted) -> bool {
     let (bins, noise) = (&prepared.bins, &prepared.noise);
-    let mut sums = [0.0; 2];
-    let predictions =
-        without.predicted.chunks_exact(bins.elements).zip(with.predicted.chunks_exact(bins.elements));
-    for (bin, (without, with)) in
-        predictions.enumerate().filter(|(bin, _)| !bins.is_clear(prepared.frames, *bin))
-    {
-        let more =
-            without.iter().zip(with).zip(&noise.by_element_counts).filter(|(_, noise)| noise.is_finite());
-        for ((without, with), noise) in more {
-            sums[0] += bins.weight[bin] * ((with - without) / noise).powi(2);
-            sums[1] += bins.weight[bin];
+    let more = |reading: usize| found.at.predicted[reading] - without.predicted[reading];
+    let (mut squares, mut readings) = (0.0, 0.0);
+    for bin in (0..bins.len()).filter(|bin| !bins.is_clear(prepared.frames, *bin)) {
+        let of_elements = noise.by_element_counts.iter().enumerate().filter(|(_, noise)| noise.is_finite());
+        for (element, noise) in of_elements {
+            squares += bins.weight[bin] * (more(bin * bins.elements + element) / noise).powi(2);
+            readings += bins.weight[bin];
         }
     }
-    sums[1] > 0.0 && noise.may_be_rounding(sums[0] / sums[1])
+    found.draft.when == When::InContact && readings > 0.0 && noise.may_be_rounding(squares / readings)
 }
 
 /// A draft, if it closes the better part of what a model leaves, as folds of the fitted presses tell. They tell nothing of a model with a

@@ -1,6 +1,5 @@
 //! The lab's own library: a folder of drafts, one `.toml` file each.
 
-use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +7,7 @@ use anyhow::{Context, anyhow};
 use tactus_model::Array;
 use tactus_model::effect::Draft;
 use tactus_report::discovery::LabEffect;
+use tactus_runner::state;
 use tactus_schema::DraftFile;
 
 use crate::cli::LibraryOption;
@@ -41,12 +41,7 @@ pub(crate) struct Library {
 impl LibraryOption {
     /// The library's folder: the named one, else that in the state directory; `None` without either.
     pub(crate) fn folder(&self) -> Option<PathBuf> {
-        let of = |variable: &str| env::var_os(variable).filter(|value| !value.is_empty()).map(PathBuf::from);
-        let of_service = || of("STATE_DIRECTORY");
-        let of_user = || of("XDG_STATE_HOME").map(|state| state.join("tactus"));
-        let of_home = || of("HOME").map(|home| home.join(".local/state/tactus"));
-        let state = || of_service().or_else(of_user).or_else(of_home);
-        self.library.clone().or_else(|| state().map(|state| state.join(FOLDER)))
+        self.library.clone().or_else(|| state::folder().map(|state| state.join(FOLDER)))
     }
 
     /// What is in the library; nothing if its folder is not there.

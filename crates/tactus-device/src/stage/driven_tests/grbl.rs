@@ -139,7 +139,8 @@ impl State {
     fn hear_line(&mut self, line: &str) -> String {
         self.heard.push((Instant::now(), line.to_owned()));
         match line {
-            "$I" => return "[VER:1.1h.20190830:]\r\nok\r\n".to_owned(),
+            // Some firmware reports by itself, and nobody has asked for that.
+            "$I" => return format!("{}[VER:1.1h.20190830:]\r\nok\r\n", self.status()),
             "$$" => return "$20=1\r\n$22=1\r\n$23=3\r\n$100=250.000\r\nok\r\n".to_owned(),
             "$X" => self.locked = false,
             "$H" => {

@@ -15,7 +15,10 @@ fn unseen_gain(more: f64) -> f64 {
     let at_rest = measured(&known, &[], &vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS]);
     let mut upon = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(7));
     for (upon, position_mm) in upon.iter_mut().zip(&at_rest.position_mm) {
-        upon.iter_mut().for_each(|upon| *upon += if position_mm[2] < 0.0 { more } else { 0.0 });
+        let more = if position_mm[2] < 0.0 { more } else { 0.0 };
+        for upon in upon {
+            *upon += more;
+        }
     }
     let frames = measured(&known, &[], &upon);
     let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
