@@ -14,6 +14,9 @@ use tactus_schema::pb::ExitStatus;
 use tactus_schema::table::{Phase, RowView};
 use tactus_schema::{Rig, WallTime};
 
+use crate::fit::Problem;
+use crate::progress::Reporter;
+use crate::search::{Candidate, Memory, Search};
 use crate::{
     BaseModel, Discovery, Experiments, Frames, Known, Options, Rehearsal, RehearsalOrder, Rule, discover,
     predict,
@@ -139,6 +142,25 @@ pub(crate) fn processes(members: usize, rms_counts: f64, time_s: f64, rng: &mut 
 /// what lies near a threshold depends on which presses are held out.
 pub(crate) const OPTIONS: Options =
     Options { seed: 5, threads: 2, rule: Rule::Protocol, tolerance_counts: None };
+
+/// A search without known terms, bound or rounding.
+pub(crate) fn search<'a>(
+    problem: &'a Problem<'a>,
+    candidates: &'a [Candidate],
+    reporter: &'a Reporter<'a>,
+) -> Search<'a> {
+    Search {
+        problem,
+        candidates,
+        options: OPTIONS,
+        known_terms: 0,
+        rounds: false,
+        may_be_rounding: false,
+        work_most: u64::MAX,
+        memory: Memory::default(),
+        reporter,
+    }
+}
 
 pub(crate) fn found(known: &Known, frames: &Frames) -> Discovery {
     discover(known, frames, OPTIONS, &ShippedRig::new(1.0), &|_| {}).unwrap()

@@ -3,10 +3,9 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::Gap;
 use crate::fit::Prepared;
-use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
+use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes, search};
 use crate::progress::Reporter;
-use crate::search::Memory;
-use crate::search::grow::{ALPHA, Search};
+use crate::search::grow::ALPHA;
 
 const NOISE_COUNTS: f64 = 1.0;
 
@@ -25,17 +24,8 @@ fn gap(more: impl Fn(&[f64], f64) -> Vec<f64>) -> Vec<Gap> {
     let frames = measured(&known, &[], &upon);
     let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
     let problem = prepared.problem();
-    let search = Search {
-        problem: &problem,
-        candidates: &[],
-        options: OPTIONS,
-        known_terms: 0,
-        rounds: false,
-        may_be_rounding: false,
-        work_most: u64::MAX,
-        memory: Memory::default(),
-        reporter: &Reporter::new(&|_| {}),
-    };
+    let reporter = Reporter::new(&|_| {});
+    let search = search(&problem, &[], &reporter);
     let located = search.locate(&prepared.base).unwrap();
     assert!(located.p_value <= ALPHA, "{}", located.p_value);
     located.gap.clone()

@@ -10,10 +10,9 @@ use tactus_schema::table::{Phase, RowView};
 use super::super::evidence::{Addition, Evidence, Signs};
 use super::{Against, COLUMNS_MAX, NoDraft, PARTS_MAX, Sight, grammar, width};
 use crate::fit::{BLOCKS_MAX, Prepared};
-use crate::fixtures::{OPTIONS, known};
+use crate::fixtures::{OPTIONS, known, search};
 use crate::progress::Reporter;
-use crate::search::Memory;
-use crate::search::grow::{ALPHA, Search};
+use crate::search::grow::ALPHA;
 use crate::{BaseModel, Frames, Known, predict};
 
 /// Two knots of a curve explain a residual of 30 standard deviations; a third one is seen by hardly a reading, and the products of its column
@@ -105,17 +104,8 @@ fn drafts_of_single_elements_that_take_too_much_memory_are_not_tried() {
         let (known, frames) = more_in_contact(array);
         let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
         let problem = prepared.problem();
-        let search = Search {
-            problem: &problem,
-            candidates: &[],
-            options: OPTIONS,
-            known_terms: 0,
-            rounds: false,
-            may_be_rounding: false,
-            work_most: u64::MAX,
-            memory: Memory::default(),
-            reporter: &Reporter::new(&|_| {}),
-        };
+        let reporter = Reporter::new(&|_| {});
+        let search = search(&problem, &[], &reporter);
         let sight = Arc::new(Sight::of(&problem, &prepared.base).unwrap());
         let atoms = search.atoms(&prepared.base, &sight);
         let all = grammar::atoms(&problem, &prepared.base, &sight, false).len();

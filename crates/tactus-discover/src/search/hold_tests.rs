@@ -5,30 +5,10 @@ use rand_chacha::ChaCha8Rng;
 use tactus_model::Effect;
 
 use super::*;
-use crate::fit::{Prepared, Problem};
-use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
+use crate::fit::Prepared;
+use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes, search};
 use crate::progress::{Progress, Reporter};
-use crate::search::{Candidate, Memory};
-
-/// A search without known terms.
-fn search<'a>(
-    problem: &'a Problem<'a>,
-    candidates: &'a [Candidate],
-    work_most: u64,
-    reporter: &'a Reporter<'a>,
-) -> Search<'a> {
-    Search {
-        problem,
-        candidates,
-        options: OPTIONS,
-        known_terms: 0,
-        rounds: false,
-        may_be_rounding: false,
-        work_most,
-        memory: Memory::default(),
-        reporter,
-    }
-}
+use crate::search::Candidate;
 
 #[test]
 fn names_that_have_held_their_place_are_not_judged_again() {
@@ -47,7 +27,7 @@ fn names_that_have_held_their_place_are_not_judged_again() {
         }
     };
     let reporter = Reporter::new(&see);
-    let search = search(&problem, &candidates, u64::MAX, &reporter);
+    let search = search(&problem, &candidates, &reporter);
     let mut grown = search.grow(&prepared.base).unwrap();
     assert_eq!(search.sorted_names(&grown.at), ["hardening"]);
     let held = grown.at.parameters.clone();
@@ -86,7 +66,7 @@ fn a_search_that_has_done_as_much_as_it_may_takes_nothing_more_and_says_so() {
         let candidates = Candidate::all(&problem, &prepared.base, &[]).unwrap();
         let work_most = problem.predictor.work() + more_work;
         let reporter = Reporter::new(&|_| {});
-        let search = search(&problem, &candidates, work_most, &reporter);
+        let search = Search { work_most, ..search(&problem, &candidates, &reporter) };
         let grown = search.grow(&prepared.base).unwrap();
         (search.sorted_names(&grown.at), grown.is_cut)
     };

@@ -4,9 +4,8 @@ use tactus_model::effect::When;
 
 use super::*;
 use crate::fit::Prepared;
-use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
+use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes, search};
 use crate::progress::Reporter;
-use crate::search::Memory;
 
 /// By how much counts in contact, with a weight for each element, are nearer to unseen presses, where all elements read so many counts more in
 /// contact, under noise of 1 count.
@@ -23,17 +22,8 @@ fn unseen_gain(more: f64) -> f64 {
     let frames = measured(&known, &[], &upon);
     let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
     let (problem, base) = (prepared.problem(), &prepared.base);
-    let search = Search {
-        problem: &problem,
-        candidates: &[],
-        options: OPTIONS,
-        known_terms: 0,
-        rounds: false,
-        may_be_rounding: false,
-        work_most: u64::MAX,
-        memory: Memory::default(),
-        reporter: &Reporter::new(&|_| {}),
-    };
+    let reporter = Reporter::new(&|_| {});
+    let search = search(&problem, &[], &reporter);
     let sight = Arc::new(Sight::of(&problem, base).unwrap());
     let is_constant = |atom: &Atom| {
         let acts_so = (atom.carrier, atom.when) == (Carrier::Counts, When::InContact);
