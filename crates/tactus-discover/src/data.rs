@@ -69,6 +69,7 @@
 //! | noise.rs | `DIFFERENCES_SHARE` | `2.0 / 3.0` | derived | von Neumann et al., in the comment |
 //! | noise.rs | `QUIETEST` | `0.7` | convention | below it, rounding looks the same |
 //! | noise.rs | `MEDIAN_SIZE` | `0.674_490` | derived | median of `abs` of a normal deviate |
+//! | noise.rs | `ALL_ROUNDING` | `0.9` | convention | 0.9 of the noise |
 //! | noise/repeats.rs | `PLACE_MM` | `0.02` | convention | places that differ by less are one |
 //! | noise/repeats.rs | `DEPTH_MM` | `0.005` | convention | the same, of depths |
 //! | noise/repeats.rs | `SECOND_LEAST` | `4` | convention | a second difference takes three |

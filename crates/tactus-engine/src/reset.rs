@@ -25,6 +25,8 @@ impl Shared {
             self.begin_reset().await?;
         }
         self.wait_for_stage().await.map_err(not_ready)?;
+        // If it was away, it is homed from here on.
+        self.begin_reset().await?;
         self.wait_for_sensor().await.map_err(not_ready)?;
         if self.status() == StageStatus::Alarm {
             self.stage.clear_alarm().await?;

@@ -55,7 +55,7 @@ impl CoveringFile {
         let Some(copy) = &self.copy else { return };
         if let Err(error) = write(copy, thickness_mm) {
             let path = copy.display();
-            tracing::warn!(%path, %error, "the covering in place is remembered among the recordings alone");
+            tracing::warn!(%path, %error, "the copy of the covering in place cannot be written: an older one may still count");
         }
     }
 }
@@ -95,7 +95,7 @@ fn write(path: &Path, thickness_mm: f64) -> io::Result<()> {
 }
 
 impl CoveringMemory for CoveringFile {
-    /// What only the file has is copied, before somebody moves that.
+    /// A thickness that only the file has is copied: recordings may be moved.
     fn recall(&self) -> io::Result<Option<f64>> {
         let [own_mm, copy_mm] = [read(&self.path)?, self.copy.as_deref().map_or(Ok(None), read)?];
         let Some(own_mm) = own_mm else { return Ok(copy_mm) };

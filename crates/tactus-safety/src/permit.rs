@@ -66,7 +66,7 @@ pub enum Denied {
     NoFreshFrame { age_s: f64, limit_s: f64 },
     /// Frames arrive, and wait too long on their way.
     #[error(
-        "frames arrive {late_s:.1} s late by the sensor's own clock: its link or this computer is too slow, or its clock stood still or goes \
+        "frames arrive {late_s:.3} s late by the sensor's own clock: its link or this computer is too slow, or its clock stood still or goes \
          wrong; a new connection begins anew (unplug the sensor for a moment, or restart the service)"
     )]
     LateFrames { late_s: f64 },

@@ -21,6 +21,8 @@ pub struct Supervisor {
     lateness: Lateness,
     /// By how much the last frame was late, if by too much.
     late_s: Option<f64>,
+    /// When it arrived.
+    arrived: Option<MonoTime>,
     contact: Contact,
     permits: Revocation,
     /// The last report of the stage.
@@ -48,6 +50,7 @@ impl Supervisor {
             elements: Elements::new(rig, service),
             lateness: Lateness::default(),
             late_s: None,
+            arrived: None,
             contact: Contact::new(rig, service),
             limits,
             permits: Revocation::default(),
@@ -97,6 +100,7 @@ impl Supervisor {
     /// Checks a frame.
     pub fn on_frame(&mut self, frame: &Frame) -> Option<Violation> {
         self.late_s = self.lateness.take(frame, self.limits.silence_max_s());
+        self.arrived = Some(frame.received.mono);
         if self.elements.take(frame, self.late_s.is_some()) {
             self.z_at_frame_mm = self.z_mm;
         }
@@ -339,11 +343,15 @@ impl Supervisor {
     fn check_frame(&self, now: MonoTime) -> Result<(), Denied> {
         let (age_s, limit_s) =
             (Limits::silence_s(now, self.elements.last_frame()), self.limits.silence_max_s());
-        if age_s <= limit_s { Ok(()) } else { Err(self.no_fresh_frame(age_s, limit_s)) }
+        if age_s <= limit_s { Ok(()) } else { Err(self.no_fresh_frame(now, age_s, limit_s)) }
     }
 
-    fn no_fresh_frame(&self, age_s: f64, limit_s: f64) -> Denied {
-        self.late_s.map_or(Denied::NoFreshFrame { age_s, limit_s }, |late_s| Denied::LateFrames { late_s })
+    fn no_fresh_frame(&self, now: MonoTime, age_s: f64, limit_s: f64) -> Denied {
+        let arrive = Limits::silence_s(now, self.arrived) <= self.limits.silence_max_s();
+        match self.late_s.filter(|_| arrive) {
+            Some(late_s) => Denied::LateFrames { late_s },
+            None => Denied::NoFreshFrame { age_s, limit_s },
+        }
     }
 
     fn check_report(&self, now: MonoTime) -> Result<(), Denied> {
@@ -360,7 +368,7 @@ impl Supervisor {
             return Ok(());
         }
         let age_s = Limits::silence_s(now, self.elements.last_frame());
-        Err(self.no_fresh_frame(age_s, 0.0))
+        Err(self.no_fresh_frame(now, age_s, 0.0))
     }
 
     fn expiry(&self, now: MonoTime) -> MonoTime {

@@ -46,6 +46,9 @@ pub(crate) const QUIETEST: f64 = 0.7;
 /// Median absolute value of a standard normal deviate.
 const MEDIAN_SIZE: f64 = 0.674_490;
 
+/// Where rounding that repeats is this share of the noise, nothing dithers.
+const ALL_ROUNDING: f64 = 0.9;
+
 /// Statistics of the noise of readings.
 #[derive(Debug, Clone)]
 pub(crate) struct Noise {
@@ -55,16 +58,22 @@ pub(crate) struct Noise {
     pub(crate) by_element_counts: Vec<f64>,
     /// Autocorrelation at lags of 0, 1, ... frames.
     pub(crate) correlation: Vec<f64>,
-    /// Share of a reading's variance that comes from rounding and repeats for the same signal, so averaging does not reduce it.
+    /// Share of a reading's variance that comes from rounding and repeats for the same signal, so averaging does not reduce it. From a quarter of a step
+    /// of noise on it is right; below, where the variance at rest lacks what repeats, to a factor of three.
     pub(crate) rounding_share: f64,
     /// For how many readings a signal repeats, in the mean over the readings in contact: where the tip rests.
     pub(crate) repeated_frames: f64,
 }
 
 impl Noise {
-    /// Whether a mean square of what a model leaves, in units of the noise, may come from rounding alone. What repeats of it is the same as long as
-    /// the signal is: a reading is off by that, and so is the zero under it.
+    /// Whether a mean square of residuals, in units of the noise, may come from rounding alone. Where nothing dithers, a signal at rest is read as
+    /// the same code for all the recording: a reading is wrong by up to half a step, and so is the zero under it.
     pub(crate) fn may_be_rounding(&self, mean_square: f64) -> bool {
+        self.rounding_share > ALL_ROUNDING && mean_square < 2.0
+    }
+
+    /// Whether so much of a mean square of residuals, in units of the noise, may be what repeats of rounding: in a reading, and in the zero under it.
+    pub(crate) fn may_repeat(&self, mean_square: f64) -> bool {
         mean_square < 2.0 * self.rounding_share
     }
 

@@ -11,8 +11,8 @@
 //!
 //! The second model's numbers have errors, as those of the truth would have: what these leave is known from the fit, and no part of `L`.
 //!
-//! A press has the weight of its readings in `L`, as it has in `E`, however few of its pairs lie that far apart. An `L` below 0 is the noise's doing: as
-//! a share it counts as 0, for the error of the share it does not.
+//! A press has the weight of its readings in `L`, as it has in `E`, however few of its pairs lie that far apart; one without any such pair is in `E`
+//! alone. An `L` below 0 comes from noise. The share takes it as 0; its standard error does not.
 //!
 //! What is random from frame to frame, such as a clock that jitters, counts as left, and no model of a mean can close it. So the most that another
 //! model may close is a share of its own, in which only what lasts is left.
@@ -78,15 +78,8 @@ struct Parts {
     left: f64,
 }
 
-impl Parts {
-    /// `None` if nothing is left or closed.
-    fn share(self) -> Option<f64> {
-        let all = self.closed + self.left;
-        (all > 0.0).then(|| self.closed / all)
-    }
-}
-
-/// The share of the sums over all presses, and its standard error.
+/// The share of the sums over all presses, and its standard error: what the share changes by without each press, to first order, since `E + L` of all
+/// presses but one may be 0. `None` if nothing is left or closed.
 fn with_error(presses: &[OfPress], parts: impl Fn(&OfPress) -> Parts) -> Option<(f64, Option<f64>)> {
     let mut total = OfPress::default();
     for of in presses {
@@ -95,18 +88,18 @@ fn with_error(presses: &[OfPress], parts: impl Fn(&OfPress) -> Parts) -> Option<
         }
     }
     let Parts { closed, left } = parts(&total);
-    let whole = Parts { closed, left: left.max(0.0) }.share()?;
-    let without = |press: &OfPress| {
-        parts(&[0, 1, 2].map(|which| [0, 1].map(|k| total[which][k] - press[which][k]))).share()
+    let all = closed + left.max(0.0);
+    let whole = (all > 0.0).then(|| closed / all)?;
+    let moved = |press: &OfPress| {
+        let Parts { closed, left } =
+            parts(&[0, 1, 2].map(|which| [0, 1].map(|k| total[which][k] - press[which][k])));
+        ((1.0 - whole) * closed - whole * left) / all
     };
-    let shares: Option<Vec<f64>> = presses.iter().map(without).collect();
-    let standard_error = shares.filter(|shares| shares.len() >= 3).map(|shares| {
-        let count = shares.len() as f64;
-        let mean = shares.iter().sum::<f64>() / count;
-        let spread: f64 = shares.iter().map(|one| (one - mean).powi(2)).sum();
-        (spread * (count - 1.0) / count).sqrt()
-    });
-    Some((whole, standard_error))
+    let moved: Vec<f64> = presses.iter().map(moved).collect();
+    let count = moved.len() as f64;
+    let mean = moved.iter().sum::<f64>() / count;
+    let spread: f64 = moved.iter().map(|one| (one - mean).powi(2)).sum();
+    Some((whole, (moved.len() >= 3).then(|| (spread * (count - 1.0) / count).sqrt())))
 }
 
 #[cfg(test)]

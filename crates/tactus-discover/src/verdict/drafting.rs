@@ -122,7 +122,8 @@ pub(super) fn drafted(
     Ok(describing(prepared, grown, found, floor)?.ok().map(Ok))
 }
 
-/// True if a draft may be what repeats of rounding: it acts in contact alone, and changes a model there by no more.
+/// True if a draft may be what repeats of rounding: it acts in contact alone, by an amount of its own for each element, and changes a model there by no
+/// more.
 fn repeats_of_rounding(prepared: &Prepared<'_>, without: &Fitted, found: &Drafted) -> bool {
     let (bins, noise) = (&prepared.bins, &prepared.noise);
     let more = |reading: usize| found.at.predicted[reading] - without.predicted[reading];
@@ -134,7 +135,8 @@ fn repeats_of_rounding(prepared: &Prepared<'_>, without: &Fitted, found: &Drafte
             readings += bins.weight[bin];
         }
     }
-    found.draft.when == When::InContact && readings > 0.0 && noise.may_be_rounding(squares / readings)
+    let is_like_it = found.draft.when == When::InContact && found.draft.weights.is_some();
+    is_like_it && readings > 0.0 && noise.may_repeat(squares / readings)
 }
 
 /// A draft, if it closes the better part of what a model leaves, as folds of the fitted presses tell. They tell nothing of a model with a

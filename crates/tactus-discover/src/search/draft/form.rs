@@ -212,21 +212,23 @@ impl Search<'_> {
         Ok((additions(&weighed, &grams, 1.0), grams))
     }
 
-    /// By how much an atom that is fitted to the other folds is nearer to the presses of each, block by block. Weights of the elements are fitted, too:
-    /// those that were found with all presses gain something in any noise.
+    /// By how much an atom that is fitted to the other folds is nearer to the presses of each, block by block. Of an atom with weights either its curve is
+    /// fitted or they are, whichever gains less: what was found with all presses gains something in any noise.
     fn unseen_gains_of(
         &self,
         at: &Fitted,
         sight: &Arc<Sight>,
         atom: &Atom,
     ) -> Result<Vec<f64>, DiscoverError> {
+        let (additions, grams) = self.alone(at, sight, atom)?;
+        let by_curve = self.unseen_gains(&grams, &additions, &[0]);
         let shared = if atom.weights.is_some() { self.curve(at, sight, atom)?.shared() } else { None };
-        let atom = match shared {
-            Some(shared) => Atom { weights: None, of_elements: true, curve: Some(shared), ..atom.clone() },
-            None => atom.clone(),
-        };
-        let (additions, grams) = self.alone(at, sight, &atom)?;
-        Ok(self.unseen_gains(&grams, &additions, &[0]))
+        let Some(shared) = shared else { return Ok(by_curve) };
+        let of_elements = Atom { weights: None, of_elements: true, curve: Some(shared), ..atom.clone() };
+        let (additions, grams) = self.alone(at, sight, &of_elements)?;
+        let by_weights = self.unseen_gains(&grams, &additions, &[0]);
+        let whole = |gains: &[f64]| gains.iter().sum::<f64>();
+        Ok(if whole(&by_weights) < whole(&by_curve) { by_weights } else { by_curve })
     }
 
     /// By how much additions that are fitted to the other folds are nearer to the presses of each, block by block.
