@@ -90,6 +90,8 @@ struct Play {
     shut: Shut,
     /// A silence of the sensor was told, and neither forgiven nor followed by worse.
     is_silent: bool,
+    /// The stage was lost and is back, and no reset has begun since.
+    was_away: bool,
     stops: u32,
     given: Vec<Given>,
 }
@@ -119,6 +121,7 @@ impl Play {
             is_active: !has_sensor,
             shut: if has_sensor { Shut::Latched } else { Shut::No },
             is_silent: false,
+            was_away: false,
             stops: 0,
             given: Vec::new(),
         };
@@ -276,6 +279,12 @@ impl Play {
         let t_mono_ns = self.now.ns();
         let report = StageState { x_mm, y_mm, z_mm, t_mono_ns, status: status.into(), ..Default::default() };
         let stood_mm = self.report.as_ref().and_then(standing_mm);
+        let was_lost =
+            self.report.as_ref().is_some_and(|report| report.status() == StageStatus::Disconnected);
+        if was_lost && status != StageStatus::Disconnected && self.z_mm.is_some() {
+            self.was_away = true;
+            self.stops += 1;
+        }
         let violation = self.supervisor.on_report(&report);
         if stood_mm.is_some_and(|stood_mm| !self.stands_at(&report, stood_mm)) {
             self.stops += 1;
@@ -349,6 +358,7 @@ impl Play {
         self.supervisor.begin_reset(self.now);
         self.shut = Shut::Resetting;
         self.is_silent = false;
+        self.was_away = false;
         self.has_zero = false;
         self.is_active = true;
         self.excused = Some(self.now);
@@ -359,6 +369,7 @@ impl Play {
         self.tell(|| format!("finish_reset -> {finished:?}"));
         if finished.is_ok() {
             assert!(self.shut != Shut::Latched && !self.is_silent, "a reset ends only what it began with");
+            assert!(!self.was_away, "a reset does not end with a stage that was away since it began");
             assert!(self.is_fresh(), "a reset ends with frames");
             assert_eq!(self.report.map(|report| report.status()), Some(StageStatus::Idle));
             self.shut = Shut::No;
@@ -416,6 +427,7 @@ impl Play {
         let [x_mm, y_mm, z_mm] = to.position_mm;
         assert_eq!(self.shut, Shut::No, "{from_mm:?} to {to:?}: {:?}", self.supervisor.fault());
         assert!(!self.is_silent, "{from_mm:?} to {to:?}: the sensor was silent");
+        assert!(!self.was_away, "{from_mm:?} to {to:?}: the stage was away");
         let depth_max_mm = self.depth_max_mm.min(envelope.depth_max_mm) + SAME_HEIGHT_MM + ROUNDING_MM;
         assert!(-z_mm <= depth_max_mm, "{to:?} is too deep: {depth_max_mm} mm");
         assert!(z_mm <= envelope.z_max_mm + ROUNDING_MM);

@@ -813,3 +813,23 @@ async fn a_reset_raises_a_tip_that_breaks_a_rule_where_it_stands() {
     assert_eq!(bench.engine.fault(), None);
     assert!(height_mm(&bench) > 1.9);
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_reset_finishes_once_an_absent_stage_is_back_and_was_homed() {
+    let bench = Bench::start(|rig| rig);
+    bench.engine.reset().await.unwrap();
+    bench.lose_stage("it was unplugged").await;
+    let back = async {
+        sleep(Duration::from_millis(300)).await;
+        bench.trouble.lock().unwrap().absent = None;
+        bench.place([25.0, 20.0, 5.0]).await;
+    };
+    let (reset, ()) = tokio::join!(bench.engine.reset(), back);
+    assert_eq!(reset.map_err(|error| error.to_string()), Ok(()));
+    assert_eq!(bench.engine.fault(), None);
+    bench.lose_stage("it was unplugged").await;
+    bench.trouble.lock().unwrap().absent = None;
+    bench.place([25.0, 20.0, 5.0]).await;
+    sleep(Duration::from_secs(1)).await;
+    assert_eq!(bench.engine.fault(), Some(Fault::Away), "its place is good for the way up alone");
+}
