@@ -71,10 +71,7 @@ impl Window {
         if at < self.from {
             return Some(self);
         }
-        self.lost += u64::from(frame.lost_before);
-        if is_late {
-            self.lost += 1;
-        }
+        self.lost += u64::from(frame.lost_before) + u64::from(is_late);
         if at < self.until || self.frames == 0 {
             if !is_late {
                 self.add(frame);

@@ -101,13 +101,11 @@ pub(super) fn drafted(
         let added = grown.parameters.terms.iter().skip(search.known_terms);
         closed.extend(added.map(|term| term.definition.stage()));
     }
+    let refused = |why| Ok(is_open(verdict).then_some(Err(why)));
     let found = match search.draft(grown, &name, alpha, against, &closed)? {
-        Ok(found) if repeats_of_rounding(prepared, grown, &found) => Err(NoDraft::Rounding),
-        found => found,
-    };
-    let found = match found {
+        Ok(found) if repeats_of_rounding(prepared, grown, &found) => return refused(NoDraft::Rounding),
         Ok(found) => found,
-        Err(why) => return Ok(is_open(verdict).then_some(Err(why))),
+        Err(why) => return refused(why),
     };
     if verdict != Verdict::Explained {
         let described = describing(prepared, grown, found, floor)?;
@@ -125,6 +123,9 @@ pub(super) fn drafted(
 /// True if a draft may be what repeats of rounding: it acts in contact alone, by an amount of its own for each element, and changes a model there by no
 /// more.
 fn repeats_of_rounding(prepared: &Prepared<'_>, without: &Fitted, found: &Drafted) -> bool {
+    if found.draft.when != When::InContact || found.draft.weights.is_none() {
+        return false;
+    }
     let (bins, noise) = (&prepared.bins, &prepared.noise);
     let more = |reading: usize| found.at.predicted[reading] - without.predicted[reading];
     let (mut squares, mut readings) = (0.0, 0.0);
@@ -135,8 +136,7 @@ fn repeats_of_rounding(prepared: &Prepared<'_>, without: &Fitted, found: &Drafte
             readings += bins.weight[bin];
         }
     }
-    let is_like_it = found.draft.when == When::InContact && found.draft.weights.is_some();
-    is_like_it && readings > 0.0 && noise.may_repeat(squares / readings)
+    readings > 0.0 && noise.may_repeat(squares / readings)
 }
 
 /// A draft, if it closes the better part of what a model leaves, as folds of the fitted presses tell. They tell nothing of a model with a

@@ -188,17 +188,21 @@ impl Search<'_> {
     /// The coefficients of an atom's columns with the greatest posterior probability.
     fn curve(&self, at: &Fitted, sight: &Arc<Sight>, atom: &Atom) -> Result<Curve, DiscoverError> {
         let (additions, grams) = self.alone(at, sight, atom)?;
-        let evidence = self.evidence_of(&additions, grams.reduced());
+        Ok(self.curve_of(&additions, &grams))
+    }
+
+    fn curve_of(&self, additions: &[Addition], grams: &Grams) -> Curve {
+        let evidence = self.evidence_of(additions, grams.reduced());
         let set = evidence.set([0]);
         let found: BTreeMap<usize, f64> = evidence.coefficients(&set).into_iter().collect();
         let directions = &additions[0].directions;
         let value = |one: &usize| found.get(one).copied().unwrap_or(0.0);
         let product = |i: usize, j: usize| grams.reduced()[(directions[i], directions[j])];
-        Ok(Curve {
+        Curve {
             values: DVector::from_iterator(directions.len(), directions.iter().map(value)),
             gram: DMatrix::from_fn(directions.len(), directions.len(), product) / self.problem.variance,
             determined: evidence.determined(&set),
-        })
+        }
     }
 
     /// An atom as the only addition, with its products.
@@ -222,8 +226,8 @@ impl Search<'_> {
     ) -> Result<Vec<f64>, DiscoverError> {
         let (additions, grams) = self.alone(at, sight, atom)?;
         let by_curve = self.unseen_gains(&grams, &additions, &[0]);
-        let shared = if atom.weights.is_some() { self.curve(at, sight, atom)?.shared() } else { None };
-        let Some(shared) = shared else { return Ok(by_curve) };
+        let weighted = atom.weights.as_ref().and_then(|_| self.curve_of(&additions, &grams).shared());
+        let Some(shared) = weighted else { return Ok(by_curve) };
         let of_elements = Atom { weights: None, of_elements: true, curve: Some(shared), ..atom.clone() };
         let (additions, grams) = self.alone(at, sight, &of_elements)?;
         let by_weights = self.unseen_gains(&grams, &additions, &[0]);
