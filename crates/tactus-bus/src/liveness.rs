@@ -142,13 +142,17 @@ impl Trust {
             .believes(&rig, session)
     }
 
-    /// Waits until the service that speaks for the rig now does so no longer; for ever if none speaks now. Cancel-safe.
+    /// Waits until the service that speaks for the rig does so no longer; if none speaks now, the first that will. Cancel-safe.
     pub(crate) fn ended(&self) -> impl Future<Output = ()> + use<> {
         let Self { rig, mut known } = self.clone();
-        let first = known.borrow().speaks(&rig);
+        let mut first = known.borrow().speaks(&rig);
+        let has_ended = move |known: &Known| {
+            let now = known.speaks(&rig);
+            first = first.or(now);
+            now != first
+        };
         async move {
-            let ended = known.wait_for(|known| first.is_some() && known.speaks(&rig) != first).await.is_ok();
-            if !ended {
+            if known.wait_for(has_ended).await.is_err() {
                 // The client is closed, and so are its queries.
                 pending::<()>().await;
             }

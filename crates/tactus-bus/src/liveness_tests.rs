@@ -65,3 +65,20 @@ fn the_announcements_are_both_tokens_and_nobody_is_neither() {
         assert!(!key(NOBODY).intersects(&key(token)));
     }
 }
+
+#[tokio::test]
+async fn a_service_that_is_seen_only_after_a_command_was_sent_to_it_is_seen_to_end() {
+    let (to_known, known) = watch::channel(Known::default());
+    let trust = Trust { rig: "sim".to_owned(), known };
+    let mut ended = Box::pin(trust.ended());
+    let mut says = async |kind| {
+        to_known.send_modify(|known| known.on_token(&Announced::Instance("sim", id(1)), kind));
+        tokio::select! {
+            biased;
+            () = &mut ended => true,
+            () = std::future::ready(()) => false,
+        }
+    };
+    assert!(!says(SampleKind::Put).await);
+    assert!(says(SampleKind::Delete).await);
+}

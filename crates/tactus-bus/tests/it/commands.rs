@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use crate::lab::{connected, free_endpoint, open, raw_session, router};
+use crate::lab::{found, free_endpoint, open, raw_session, router};
 use prost::Message as _;
-use tactus_bus::{BusError, Client, CommandCall, Request};
+use tactus_bus::{BusError, Client, CommandCall, Credentials, Request};
 use tactus_schema::{
     key::{Command, Keys},
     pb,
@@ -194,7 +194,7 @@ async fn a_command_ends_with_its_service_although_nobody_ends_the_query() {
     let _alive = service.liveliness().declare_token(keys.alive()).await.unwrap();
     let instance = keys.instance(&service.zid().to_string());
     let instance = service.liveliness().declare_token(instance).await.unwrap();
-    let client = connected(&endpoint, "bench").await;
+    let client = found(&endpoint, "bench", &Credentials::default()).await;
 
     let request = asked_by("test");
     let asking = client.command(Command::Experiments, &request, PATIENCE);
