@@ -101,5 +101,4 @@ pub(crate) use prepare::Prepared;
 pub(crate) use problem::{Fitted, Free, Problem, undone};
 pub use random_walk::RunWalks;
 pub(crate) use random_walk::{RANDOM_WALK, RandomWalk, is_random_walk};
-pub(crate) use scale::Scale;
 pub(crate) use sums::{BLOCKS_MAX, Direction};

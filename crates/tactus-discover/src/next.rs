@@ -279,7 +279,8 @@ impl Planner<'_> {
         let mut bins = Bins::of(frames, true)?;
         let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
         bins.weigh(frames, self.noise, &all);
-        work(&Problem::new(Predictor::new(self.known, frames, &bins), self.noise))
+        let predictor = Predictor::new(self.known, frames, &bins).read_as(self.frames);
+        work(&Problem::new(predictor, self.noise))
     }
 }
 

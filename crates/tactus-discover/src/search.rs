@@ -94,7 +94,7 @@
 //! | hold.rs | `EXCHANGES_MAX` | `4` | cost | of rounds; 3 at first |
 //! | hold.rs | `HARDLY_ANYTHING` | `0.25` | convention | half of the rms (decision 0055) |
 //! | hold.rs | `OTHERS_MAX` | `4` | cost | of fits |
-//! | hold.rs | `SET_PROBABILITY` | `0.95` | convention | the 95 % of issue 19 |
+//! | hold.rs | `SET_PROBABILITY` | `0.95` | convention | 19 in 20 |
 //! | hold.rs | `SET_UNITS` | `3.0` | derived | `exp(-3)` is 5 % |
 //! | jumps.rs | `CELLS` | `1024` | cost | of a place |
 //! | jumps.rs | `SHARE_LEAST` | `0.005` | convention | the readings of a few presses make no jump |
@@ -105,6 +105,7 @@
 //! | not_shown.rs | `MOVING_LEAST` | `20` | convention | fewer frames are the ends of moves |
 //! | pass.rs | `FREE_SHARE` | `0.4` | measured | on tuning sets of 2026-11-25: right classes 0.83 and more, wrong ones 0.21; no recipe is kept, since reports do not have it |
 //! | rivals.rs | `KNOTS` | `5` | cost | straight lines over four parts of the range |
+//! | rivals.rs | `JITTER` | `1e-3` | convention | a stage holds a micrometre |
 //! | rivals.rs | `SIGNAL_SHARE` | `0.02` | convention | readings without a signal place no knots |
 //! | scatter.rs | `REST_FRAMES` | `3` | derived | a line through them takes two |
 //! | scatter.rs | `NOISE_STEPS` | `0.7` | convention | below it, rounding is no dither |
@@ -126,7 +127,7 @@
 //! | wiring.rs | `STANDS_OUT` | `6.0` | convention | six times the typical reduction |
 //! | wiring.rs | `PAIRS_MAX` | `4` | cost | of shapes |
 //! | wiring.rs | `DEAD_SHARE` | `0.3` | convention | of a declared gain |
-//! | wiring.rs | `TOLD` | `0.95` | convention | the 95 % of issue 19 |
+//! | wiring.rs | `TOLD` | `0.95` | convention | 19 in 20 |
 
 mod bic;
 mod candidates;

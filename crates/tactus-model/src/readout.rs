@@ -2,6 +2,9 @@
 
 use crate::Array;
 
+/// A full scale of whole steps may be a hair less than that after a division.
+const STEPS_ROUNDED: f64 = 1e-9;
+
 /// The converter behind every element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readout {
@@ -18,7 +21,7 @@ impl Readout {
     /// The reading for `counts` plus `noise_counts`, a noise sample that the caller draws: limited to 0 and full scale, and
     /// rounded to the nearest step.
     pub fn read(&self, counts: f64, noise_counts: f64) -> f64 {
-        let most_steps = (self.full_scale_counts / self.step_counts).floor();
+        let most_steps = (self.full_scale_counts / self.step_counts * (1.0 + STEPS_ROUNDED)).floor();
         let steps = ((counts + noise_counts) / self.step_counts).clamp(0.0, most_steps);
         steps.round() * self.step_counts
     }

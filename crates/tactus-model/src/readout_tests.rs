@@ -26,3 +26,14 @@ fn the_last_step_does_not_pass_full_scale() {
     assert_eq!(readout.read(1e9, 0.0).to_bits(), 96.0_f64.to_bits());
     assert_eq!(readout.read(43.0, 0.0).to_bits(), 40.0_f64.to_bits());
 }
+
+/// In volts, full scale over a step is a hair less than the whole number that it stands for.
+#[test]
+fn the_last_step_is_that_of_full_scale_in_any_unit() {
+    for unit in [1e-4, 1e-3, 0.01, 1.0 / 3.0, 1e4] {
+        let full_scale = 4095.0 * unit;
+        let array = Array::new("volts", [1.0, 1.0], vec![0.0], vec![0.0], 30.0, full_scale, unit).unwrap();
+        let most = Readout::of(&array).read(1e9, 0.0);
+        assert!((most - full_scale).abs() < 1e-6 * full_scale, "{unit}: {most}");
+    }
+}

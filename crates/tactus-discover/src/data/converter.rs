@@ -24,6 +24,8 @@ const READINGS_LEAST: usize = 20;
 const WIDER: f64 = 1.4;
 /// Greatest distance of a reading from the lattice, as a share of a step.
 const OFF_MAX: f64 = 0.02;
+/// The part of that which the rounding of readings may add: a step that is nearly lost in it is none.
+const ROUNDED_MAX: f64 = 0.08;
 /// Gaps that are looked at, at most; with more, readings are too few to show codes.
 const GAPS_MAX: usize = 512;
 /// A code at the end of a gap has at least so many readings.
@@ -113,16 +115,9 @@ impl Frequencies {
         if readings.len() < READINGS_LEAST {
             return None;
         }
-        let step = readings.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
-        if step < WIDER * declared_counts.max(f64::MIN_POSITIVE) {
-            return None;
-        }
         // The full scale need not be a whole number of steps.
-        let off = readings[..readings.len() - 1].iter().filter(|reading| {
-            let steps = (*reading - readings[0]) / step;
-            (steps - steps.round()).abs() > OFF_MAX
-        });
-        (off.count() == 0).then(|| {
+        let step = lattice_step(&readings[..readings.len() - 1])?;
+        (step >= WIDER * declared_counts.max(f64::MIN_POSITIVE)).then(|| {
             let chance = (declared_counts / step).max(1e-3).powf(readings.len() as f64 - 2.0);
             Converter { fault: Fault::WiderSteps(step), p_value: chance.max(f64::MIN_POSITIVE) }
         })
@@ -173,6 +168,24 @@ impl Frequencies {
         let piled = before + after;
         (piled > PILED_LEAST * usual * missing_counts / step_counts).then(|| before / piled)
     }
+}
+
+/// The step of a lattice on which all of these rising readings lie, if they lie on one. In steps that are no binary fractions each reading is
+/// rounded, so that a difference of two says the step only nearly: as far as it reaches the readings are numbered, by which it is said anew.
+fn lattice_step(readings: &[f64]) -> Option<f64> {
+    let (first, last) = (*readings.first()?, *readings.last()?);
+    let mut step = readings.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+    let rounding = last.abs().max(first.abs()) * f64::from(f32::EPSILON);
+    let off_max = |step: f64| OFF_MAX * step + rounding.min(ROUNDED_MAX * step);
+    let number = |reading: f64, step: f64| ((reading - first) / step).round();
+    for reading in readings.iter().skip(1) {
+        let off = reading - first - number(*reading, step) * step;
+        if off.abs() > off_max(step) {
+            return None;
+        }
+        step = (reading - first) / number(*reading, step);
+    }
+    Some(step)
 }
 
 /// For each gap, the logarithm of the probability that no reading is inside, had the converter those codes: of an element the first crossing in

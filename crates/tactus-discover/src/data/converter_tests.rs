@@ -41,6 +41,22 @@ fn readings_on_a_wider_lattice_give_its_step() {
     assert!((step - 4.0).abs() < 1e-6 && chance < 1e-9, "{step} {chance}");
 }
 
+/// In volts a step is no binary fraction, and each reading is rounded to single precision.
+#[test]
+fn steps_are_seen_in_any_unit() {
+    for unit in [1e-4, 1e-3, 1.0 / 4095.0, 0.01, 0.1, 1e4] {
+        #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
+        let codes = |step: f64| (0..16_000).map(move |k| (unit * (100.0 + step * f64::from(k))) as f32);
+        let seen = |step| match Converter::seen(&readings(codes(step)), unit)?.fault {
+            Fault::WiderSteps(step_counts) => Some(step_counts / unit),
+            Fault::Gaps(_) => None,
+        };
+        let step = seen(4.0).unwrap();
+        assert!((step - 4.0).abs() < 1e-5, "unit {unit}: {step}");
+        assert_eq!(seen(1.0), None, "unit {unit}");
+    }
+}
+
 #[test]
 fn readings_on_the_declared_lattice_give_none() {
     assert!(Converter::seen(&readings((0..40_i16).map(|k| 100.0 + f32::from(k))), 1.0).is_none());

@@ -25,7 +25,6 @@ use super::estimates::errors;
 use super::knots::{bounded, is_of_run_time};
 use super::parameters::{Parameters, Term};
 use super::problem::{Fitted, Free, Problem, least_step};
-use super::scale::Scale;
 use super::tiles::add;
 use super::totals::{Block, Kept, Segments, Total};
 use crate::data::DiscoverError;
@@ -246,7 +245,7 @@ impl Problem<'_> {
             Free::Of { term, parameter } => {
                 let of = &at.terms[term];
                 let known = &of.definition.parameters[parameter];
-                let width = Scale::of(known, self.duration_s).width();
+                let width = self.scale_of(known).width();
                 (known.neutral == 0.0).then(|| (of.definition.name, of.values[parameter], width))
             }
             Free::Knot { term, knot } => {
@@ -268,7 +267,7 @@ impl Problem<'_> {
             }
             (Free::Of { term, parameter }, None) => {
                 let known = &at.terms[term].definition.parameters[parameter];
-                let stride = Scale::of(known, self.duration_s).stride_max();
+                let stride = self.scale_of(known).stride_max();
                 Prior { centre: 0.0, precision: 1.0 / (stride * stride) }
             }
             (Free::SigmaIntercept | Free::SigmaSlope | Free::RunGain { .. } | Free::Knot { .. }, None) => {

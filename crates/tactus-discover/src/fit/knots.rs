@@ -13,7 +13,7 @@ use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Rises, Table};
 
 use super::parameters::Term;
 use super::problem::{Problem, solve};
-use super::scale::Scale;
+use super::scale::{Extent, Scale};
 use crate::data::{Frames, interval_s, presses};
 
 /// Step of a value for derivatives, as a share of its range.
@@ -99,11 +99,11 @@ impl Term {
     }
 
     /// Moves all its knots from their neutral values: those of a curve by these steps, those of a table by steps on the parameter's scale.
-    pub(crate) fn free_steps(&mut self, steps: &[f64], duration_s: f64) {
+    pub(crate) fn free_steps(&mut self, steps: &[f64], extent: Extent) {
         for (knot, step) in steps.iter().enumerate() {
             if let Some((table, at)) = self.table_at(knot) {
                 let (parameter, table) = &mut self.tables[table];
-                let scale = Scale::of(&self.definition.parameters[*parameter], duration_s);
+                let scale = Scale::of(&self.definition.parameters[*parameter], extent);
                 table.values[at] = scale.forward(table.values[at], scale.bounded(*step));
             } else {
                 self.move_knot(knot, *step);
@@ -285,13 +285,13 @@ fn is_of_signal(curve: &FreeCurve) -> bool {
 fn highest_gain(problem: &Problem<'_>) -> f64 {
     let gains = &problem.predictor.known.response.sensitivity_counts_per_mm;
     let mean = gains.iter().sum::<f64>() / gains.len() as f64;
-    let highest = gains.iter().copied().fold(mean, f64::max);
-    if mean > 0.0 { highest / mean } else { 1.0 }
+    let over_mean = gains.iter().map(|gain| gain / mean).filter(|over| over.is_finite());
+    over_mean.fold(1.0, f64::max)
 }
 
 /// Places of a curve's knots that the frames can tell apart; none if there are too few.
 pub(crate) fn places(curve: &FreeCurve, problem: &Problem<'_>) -> Vec<f64> {
-    let (frames, duration_s) = (problem.predictor.frames, problem.duration_s);
+    let (frames, duration_s) = (problem.predictor.frames, problem.extent.duration_s);
     let deepest_mm = frames.position_mm.iter().map(|[_, _, z_mm]| -z_mm).fold(0.0, f64::max);
     let thickest_mm = frames.covering_mm.iter().copied().fold(0.0, f64::max);
     let depth_mm = deepest_mm.min(thickest_mm).max(f64::MIN_POSITIVE);

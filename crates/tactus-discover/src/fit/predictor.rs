@@ -19,12 +19,20 @@ pub(crate) struct Predictor<'a> {
     pub(crate) bins: &'a Bins,
     /// Cached images of presses, shared by all predictions.
     pub(crate) images: Arc<Images>,
+    /// The least count that the converter gives.
+    least_counts: f64,
     /// Work of all predictions so far: see [`Predictor::work`].
     work: Arc<AtomicU64>,
 }
 
 /// Greatest number of cached images of 48 elements, about 130 MB.
 const IMAGES_MAX: usize = 200_000;
+
+/// The least count that the converter of these readings gives. One that reads below 0 does not end there, such as where a zero is subtracted.
+fn least_counts(readings: &Frames) -> f64 {
+    let ends_at_0 = readings.counts.iter().all(|counts| *counts >= 0.0 || counts.is_nan());
+    if ends_at_0 { 0.0 } else { f64::NEG_INFINITY }
+}
 
 /// An empty cache of images, with the same number of values for every array.
 pub(crate) fn no_images(elements: usize) -> Arc<Images> {
@@ -44,7 +52,13 @@ impl<'a> Predictor<'a> {
         bins: &'a Bins,
         images: &Arc<Images>,
     ) -> Self {
-        Self { known, frames, bins, images: Arc::clone(images), work: Arc::default() }
+        let (images, least_counts) = (Arc::clone(images), least_counts(frames));
+        Self { known, frames, bins, images, least_counts, work: Arc::default() }
+    }
+
+    /// The same with the converter that gave other readings.
+    pub(crate) fn read_as(self, readings: &Frames) -> Self {
+        Self { least_counts: least_counts(readings), ..self }
     }
 
     /// How much was computed so far, in predicted readings, each counted once and once more for each effect of its model. It depends on the
@@ -276,16 +290,14 @@ impl Stream<'_> {
 
     /// What follows the pipeline for the bins from `first_bin` on: walks of the baselines, and the converter's range.
     fn finish(&mut self, first_bin: usize, predicted: &mut [f64]) {
-        let Predictor { known, bins, .. } = self.predictor;
+        let Predictor { known, bins, least_counts, .. } = self.predictor;
         self.bin = first_bin + predicted.len() / bins.elements;
         if let Some(walk) = &self.parameters.walk {
             walk.add_from(bins, first_bin, 1.0, predicted);
         }
         let full_scale_counts = known.array.full_scale_counts();
-        let is_positive = self.parameters.sensitivity.iter().all(|one| *one >= 0.0);
-        let least = if is_positive { 0.0 } else { f64::NEG_INFINITY };
         for counts in predicted {
-            *counts = counts.clamp(least, full_scale_counts);
+            *counts = counts.clamp(*least_counts, full_scale_counts);
         }
     }
 }

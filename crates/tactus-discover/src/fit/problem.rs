@@ -19,15 +19,15 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use tactus_model::effect::ParameterKind;
+use tactus_model::effect::{Parameter, ParameterKind};
 
 use super::elimination::Elimination;
 use super::knots::bounded;
 use super::parameters::{Parameters, Term};
 use super::predictor::Predictor;
-use super::scale::Scale;
+use super::scale::{Extent, Scale};
 use super::sums::Direction;
-use crate::data::{Contacts, DiscoverError, Noise, QUIETEST};
+use crate::data::{Bins, Contacts, DiscoverError, Noise, QUIETEST};
 use crate::numbers::parallel;
 
 /// A fit ends when the expected reduction of the cost by a step is less than this.
@@ -63,8 +63,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) gained_runs: Vec<usize>,
     /// True if the spread is fitted.
     pub(crate) spread_free: bool,
-    /// Duration of the longest run; at least 1 s.
-    pub(crate) duration_s: f64,
+    /// How far the data reach.
+    pub(crate) extent: Extent,
     /// By how much the variance of a sum of squares exceeds that of independent readings.
     pub(crate) squares_inflation: f64,
 }
@@ -168,7 +168,10 @@ impl<'a> Problem<'a> {
             coverings: coverings_mm.len(),
             gained_runs,
             spread_free: Contacts::of(frames).distinct_places() > 1,
-            duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
+            extent: Extent {
+                duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
+                span_counts: span_counts(bins, noise),
+            },
             predictor,
             squares_inflation: noise.squares_inflation(LONG_FRAMES),
         }
@@ -298,8 +301,12 @@ impl<'a> Problem<'a> {
     }
 
     fn scale(&self, at: &Parameters, term: usize, parameter: usize) -> Scale {
-        let known = &at.terms[term].definition.parameters[parameter];
-        Scale::of(known, self.duration_s)
+        self.scale_of(&at.terms[term].definition.parameters[parameter])
+    }
+
+    /// The scale on which a parameter is fitted to these data.
+    pub(crate) fn scale_of(&self, parameter: &Parameter) -> Scale {
+        Scale::of(parameter, self.extent)
     }
 
     /// The best parameters near a start, in at most `rounds` rounds. Derivatives by numbered parameters, the knots of a curve, are taken
@@ -499,6 +506,16 @@ impl<'a> Problem<'a> {
         }
         errors
     }
+}
+
+/// From the least to the greatest count of the element that varies most; at least the noise.
+fn span_counts(bins: &Bins, noise: &Noise) -> f64 {
+    let of_element = |element: usize| {
+        let counts = || bins.counts.iter().skip(element).step_by(bins.elements).copied();
+        counts().fold(f64::NEG_INFINITY, f64::max) - counts().fold(f64::INFINITY, f64::min)
+    };
+    let seen = noise.by_element_counts.iter().enumerate().filter(|(_, rms)| rms.is_finite());
+    seen.map(|(element, _)| of_element(element)).fold(noise.rms_counts.max(f64::MIN_POSITIVE), f64::max)
 }
 
 /// The least step of a free parameter that its class allows.

@@ -28,9 +28,9 @@ pub(crate) static RANDOM_WALK: Definition = Definition {
     name: "baseline-drift",
     summary: "the baseline of each element follows a random walk in time",
     parameters: &[
-        Parameter::given("counts_per_root_s", 0.0, [0.0, 1e6]),
+        Parameter::given("counts_per_root_s", 0.0, [0.0, Parameter::COUNTS_MAX]),
         Parameter::given("knot_s", 0.0, [0.0, 1e6]),
-        Parameter::given("rms_counts", 0.0, [0.0, 1e6]),
+        Parameter::given("rms_counts", 0.0, [0.0, Parameter::COUNTS_MAX]),
     ],
     near_twins: &["imprint", "relaxation", "gain-drift"],
     acts_by: &[Covariate::Time, Covariate::Press, Covariate::Temperature],
@@ -144,9 +144,7 @@ impl RandomWalk {
                     ("duration_s", duration_s),
                 ];
                 let offsets = definition.parameters.iter().filter(|one| one.name.starts_with("offset"));
-                let offsets = offsets
-                    .zip(&values[1..])
-                    .map(|(one, value)| (one.name, (value - values[0]).clamp(one.range[0], one.range[1])));
+                let offsets = offsets.zip(&values[1..]).map(|(one, value)| (one.name, value - values[0]));
                 effects.push(Effect::of(definition, given.into_iter().chain(offsets))?);
             }
         }
@@ -182,7 +180,7 @@ impl<'a> Baselines<'a> {
 
     fn walking(problem: &'a Problem<'a>, weights: &'a [f64], knot_s: f64, counts_per_root_s: f64) -> Self {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some knots")]
-        let steps = (problem.duration_s / knot_s).round() as usize;
+        let steps = (problem.extent.duration_s / knot_s).round() as usize;
         Self::new(problem, weights, knot_s, steps + 1, stiffness(counts_per_root_s, knot_s))
     }
 
@@ -314,7 +312,7 @@ impl Problem<'_> {
         let mut best: Option<WalkEstimate> = None;
         let mut knots = KNOTS;
         loop {
-            let knot_s = self.duration_s / knots as f64;
+            let knot_s = self.extent.duration_s / knots as f64;
             let mut baselines = Baselines::walking(self, weights, knot_s, noise_counts);
             let sums = baselines.sums(residual);
             let walks = (0..RATES).map(|step| {
@@ -329,11 +327,11 @@ impl Problem<'_> {
             }
             best = Some(walk);
             knots *= 2;
-            if self.duration_s / (knots as f64) < KNOT_S_LEAST {
+            if self.extent.duration_s / (knots as f64) < KNOT_S_LEAST {
                 break;
             }
         }
-        best.unwrap_or(WalkEstimate { knot_s: self.duration_s, counts_per_root_s: 0.0, gain: 0.0 })
+        best.unwrap_or(WalkEstimate { knot_s: self.extent.duration_s, counts_per_root_s: 0.0, gain: 0.0 })
     }
 }
 

@@ -1,4 +1,6 @@
 //! Scale on which a fit varies a parameter: linear, or logarithmic if the range spans orders of magnitude.
+//!
+//! What is much or little of a parameter its range says; of a frequency the length of the data, and of counts their own extent.
 
 use tactus_model::effect::Parameter;
 
@@ -12,34 +14,47 @@ const STEP: f64 = 1e-3;
 const LOG_STRIDE_MAX: f64 = 1.5;
 const STRIDE_MAX: f64 = 0.25;
 
+/// How far data reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Extent {
+    /// Duration of the longest run; at least 1 s. It is the resolution of frequencies.
+    pub(crate) duration_s: f64,
+    /// From the least to the greatest reading of the element that varies most.
+    pub(crate) span_counts: f64,
+}
+
 /// The scale of one parameter.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scale {
     range: [f64; 2],
     logarithmic: bool,
+    /// Length of the range in the parameter's unit; of counts, of what data of their extent could show.
+    pub(crate) reach: f64,
     /// A small step, for derivatives.
     pub(crate) step: f64,
     stride_max: f64,
 }
 
 impl Scale {
-    /// Scale of a parameter, in data of a given duration, which determines the resolution of frequencies.
-    pub(crate) fn of(parameter: &Parameter, duration_s: f64) -> Self {
+    /// Scale of a parameter, in data of an extent.
+    pub(crate) fn of(parameter: &Parameter, extent: Extent) -> Self {
         let range = parameter.range;
+        // Up or down by all that there is.
+        let reach = if parameter.is_counts() { 2.0 * extent.span_counts } else { range[1] - range[0] };
+        let linear = |step, stride_max| Self { range, logarithmic: false, reach, step, stride_max };
         if parameter.name.ends_with("_hz") {
-            let period_hz = 1.0 / duration_s.max(1.0);
-            return Self { range, logarithmic: false, step: 0.02 * period_hz, stride_max: 0.3 * period_hz };
+            let period_hz = 1.0 / extent.duration_s.max(1.0);
+            return linear(0.02 * period_hz, 0.3 * period_hz);
         }
         if range[0] > 0.0 && range[1] / range[0] >= ORDERS {
-            return Self { range, logarithmic: true, step: LOG_STEP, stride_max: LOG_STRIDE_MAX };
+            return Self { range, logarithmic: true, reach, step: LOG_STEP, stride_max: LOG_STRIDE_MAX };
         }
-        let width = range[1] - range[0];
-        Self { range, logarithmic: false, step: STEP * width, stride_max: STRIDE_MAX * width }
+        linear(STEP * reach, STRIDE_MAX * reach)
     }
 
     /// Width of the range on this scale.
     pub(crate) fn width(&self) -> f64 {
-        self.distance(self.range[0], self.range[1])
+        if self.logarithmic { self.distance(self.range[0], self.range[1]) } else { self.reach }
     }
 
     /// The value after a step, limited to the range.

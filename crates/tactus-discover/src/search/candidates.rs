@@ -6,7 +6,7 @@ use tactus_model::effect::{By, CurveKind, Definition, Knots, ParameterKind, REGI
 
 use super::wiring;
 use crate::data::{DiscoverError, Line, interval_s};
-use crate::fit::{Fitted, Free, Problem, Scale, Term, places, table_places};
+use crate::fit::{Fitted, Free, Problem, Term, places, table_places};
 
 /// Number of grid values of a shape parameter that spans orders of magnitude, and of any other or a ratio of times.
 const VALUES_MANY: usize = 5;
@@ -75,15 +75,15 @@ impl Candidate {
             let range = known.range;
             if known.name.ends_with("_hz") {
                 shapes = of_lines(&shapes, parameter, lines);
-                alternatives = problem.duration_s / (2.0 * interval_s(problem.predictor.frames));
+                alternatives = problem.extent.duration_s / (2.0 * interval_s(problem.predictor.frames));
             } else if known.name == "duration_s" {
-                shapes = cross(&shapes, parameter, &[problem.duration_s.clamp(range[0], range[1])]);
+                shapes = cross(&shapes, parameter, &[problem.extent.duration_s.clamp(range[0], range[1])]);
             } else if acts && known.is_apart {
                 apart.push(parameter);
             } else if acts {
                 amplitudes.push(parameter);
             } else {
-                let values = grid(known.name, range, known.neutral, problem.duration_s);
+                let values = grid(known.name, range, known.neutral, problem.extent.duration_s);
                 shapes = cross(&shapes, parameter, &values);
             }
         }
@@ -141,7 +141,7 @@ impl Candidate {
             return crossed(start);
         }
         if start.is_free() {
-            start.free_steps(coefficients, problem.duration_s);
+            start.free_steps(coefficients, problem.extent);
             return start;
         }
         for (parameter, step) in amplitudes.iter().zip(coefficients) {
@@ -149,7 +149,7 @@ impl Candidate {
             let [least, most] = known.range;
             let value = &mut start.values[*parameter];
             let margin = [0.02 * (*value - least), 0.02 * (most - *value)];
-            let scale = Scale::of(known, problem.duration_s);
+            let scale = problem.scale_of(known);
             // Beyond the longest step of a fit, derivatives at neutral amplitudes say nothing.
             let moved = scale.forward(*value, scale.bounded(*step));
             *value = moved.clamp(least + margin[0], most - margin[1]);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use tactus_model::effect::Definition;
 use tactus_model::{Contact, Covering, ForwardModel, Response};
 
+use super::rivals::JITTER;
 use crate::data::{DiscoverError, History, Known};
 use crate::fit::{Free, Parameters, Problem, Term};
 
@@ -244,7 +245,7 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     let mut add = |covariate, unit, values: &[f64], among: &[bool], parts: usize, forms: &[Form]| {
         let kept: Vec<f64> =
             values.iter().zip(among).filter(|(_, among)| **among).map(|(one, _)| *one).collect();
-        for range in ranges(values, among, parts) {
+        for range in ranges(values, among, parts, if unit == "counts" { 0.0 } else { JITTER }) {
             let within = |(value, among): (&f64, &bool)| {
                 f64::from(u8::from(*among && *value >= range[0] && *value < range[1]))
             };
@@ -305,7 +306,7 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
         factor: Factor::Bins(Arc::new(vec![1.0; bins.len()])),
     });
     let strong: Vec<bool> = forms.signal.iter().map(|signal| signal.abs() > 0.0).collect();
-    for range in ranges(&forms.signal, &strong, 8) {
+    for range in ranges(&forms.signal, &strong, 8, 0.0) {
         let (factor, range) = (Factor::Within(range), closed(range, &forms.signal));
         made.push(Feature { covariate: "signal", unit: "counts", form: Signal, range, factor });
     }
@@ -336,7 +337,7 @@ fn of_elements(forms: &Forms, deep: &[bool], elements: usize) -> Vec<Feature> {
     let mut made: Vec<Feature> = loudest.iter().map(whole).collect();
     let depths: Vec<f64> =
         depth_mm.iter().zip(deep).filter(|(_, deep)| **deep).map(|(depth, _)| *depth).collect();
-    for range in ranges(depth_mm, deep, ELEMENT_DEPTHS) {
+    for range in ranges(depth_mm, deep, ELEMENT_DEPTHS, JITTER) {
         let within =
             |depth: &f64| f64::from(u8::from(*depth > 0.0 && *depth >= range[0] && *depth < range[1]));
         let factor = Arc::new(depth_mm.iter().map(within).collect());
@@ -347,8 +348,8 @@ fn of_elements(forms: &Forms, deep: &[bool], elements: usize) -> Vec<Feature> {
     made
 }
 
-/// Divides the values into ranges with equal numbers of bins; no ranges if the values do not differ.
-fn ranges(values: &[f64], among: &[bool], parts: usize) -> Vec<[f64; 2]> {
+/// Divides the values into ranges with equal numbers of bins; no ranges if the values do not differ by more than jitter.
+fn ranges(values: &[f64], among: &[bool], parts: usize, jitter: f64) -> Vec<[f64; 2]> {
     let mut sorted: Vec<f64> = values
         .iter()
         .zip(among)
@@ -359,8 +360,7 @@ fn ranges(values: &[f64], among: &[bool], parts: usize) -> Vec<[f64; 2]> {
     let (Some(least), Some(most)) = (sorted.first().copied(), sorted.last().copied()) else {
         return Vec::new();
     };
-    // The reported position of a stage at rest still varies slightly.
-    if most - least <= 1e-3 * most.abs().max(1.0) {
+    if most - least <= jitter.max(1e-3 * most.abs().max(least.abs())) {
         return Vec::new();
     }
     let mut edges: Vec<f64> = (1..parts).map(|k| sorted[k * sorted.len() / parts]).collect();

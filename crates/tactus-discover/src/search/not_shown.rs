@@ -29,7 +29,7 @@ pub(crate) fn lacking(problem: &Problem<'_>, replicates: bool) -> Vec<NotShown> 
         .iter()
         .filter_map(|definition| {
             let effect = definition.name;
-            let reason = lacks(effect, &contacts, unloads, replicates, problem.duration_s)?;
+            let reason = lacks(effect, &contacts, unloads, replicates, problem.extent.duration_s)?;
             Some(NotShown { effect, reason: reason.to_owned() })
         })
         .collect()

@@ -15,7 +15,7 @@ use super::rivals::{Rival, rivals};
 use super::score::Score;
 use super::varying::varying_effect;
 use crate::data::DiscoverError;
-use crate::fit::{Direction, Fitted, Free, Grams, Problem, RANDOM_WALK, Scale, Term};
+use crate::fit::{Direction, Fitted, Free, Grams, Problem, RANDOM_WALK, Term};
 use crate::numbers::{median, parallel};
 
 /// A class speaks for its free part, which model files cannot hold, if it has this share of the odds of that. From tuning sets: right classes
@@ -263,7 +263,7 @@ fn shape_directions(problem: &Problem<'_>, at: &Fitted, amplitudes: &[usize], sh
     for parameter in amplitudes {
         part.directions.push(problem.towards(&start, Free::Of { term, parameter: *parameter }));
         let known = &shape.definition.parameters[*parameter];
-        part.widths.push(Scale::of(known, problem.duration_s).width());
+        part.widths.push(problem.scale_of(known).width());
         let value = shape.values[*parameter];
         part.signs.push(match known.range {
             _ if wires => Signs::Both,
@@ -280,7 +280,7 @@ fn shape_directions(problem: &Problem<'_>, at: &Fitted, amplitudes: &[usize], sh
 fn free_directions(problem: &Problem<'_>, at: &Fitted, of: &Candidate, shape: &Term, first: usize) -> Part {
     if let Some((parameter, table)) = shape.tables.first() {
         let amplitude = of.amplitudes().iter().position(|one| one == parameter).unwrap_or(0);
-        let width = Scale::of(&of.definition.parameters[*parameter], problem.duration_s).width();
+        let width = problem.scale_of(&of.definition.parameters[*parameter]).width();
         let direction = first + amplitude;
         let times = |factor| Direction::Times { direction, factor: Arc::new(factor) };
         let directions: Vec<_> = problem.weights_at(table).into_iter().map(times).collect();
@@ -298,3 +298,7 @@ fn free_directions(problem: &Problem<'_>, at: &Fitted, of: &Candidate, shape: &T
         signs: knots().map(sign).collect(),
     }
 }
+
+#[cfg(test)]
+#[path = "pass_tests.rs"]
+mod tests;

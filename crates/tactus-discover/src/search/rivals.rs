@@ -30,8 +30,8 @@
 //! | jump in counts | 2026-11-28 | `range-switch`: an amplifier whose ranges do not meet was named `hardening` |
 //! | place, in counts | 2026-11-29 | `arm-shadow`: what the arm over the sensor adds to counts |
 //!
-//! Tones and distances were added on 2026-11-24, with the list of rivals of issue 19. The height above the surface was added on the same day. It is
-//! not in that list, and the history does not tell whether a miss of `proximity` led to it.
+//! Tones and distances were added on 2026-11-24. The height above the surface was added on the same day; the history does not tell whether a
+//! miss of `proximity` led to it.
 //!
 //! Beside them stand the effects that the model has, each with a strength that varies ([`super::varying`]).
 //!
@@ -57,6 +57,8 @@ use crate::fit::{Direction, Fitted, Problem, hat};
 /// Knots of a function of one covariate.
 const KNOTS: usize = 5;
 
+/// The reported position of a stage at rest still varies slightly, by so many mm; times and speeds are not finer.
+pub(super) const JITTER: f64 = 1e-3;
 /// Knots of a function of single readings lie where the signal is at least this share of the largest.
 const SIGNAL_SHARE: f64 = 0.02;
 
@@ -122,7 +124,8 @@ pub(crate) fn rivals<'a>(
     });
     let height_mm: Vec<f64> = history.depth_mm.iter().map(|depth_mm| -depth_mm).collect();
     let low: Vec<bool> = height_mm.iter().zip(&free).map(|(mm, free)| *free && *mm <= LOW_MM).collect();
-    let (of_sum, of_places) = (hats(&sums, deep), both(&of_place, deep));
+    // Counts have no unit in which a difference would be little.
+    let (of_sum, of_places) = (hats_of(&sums, deep, 0.0), both(&of_place, deep));
     let (of_sum_apart, of_places_apart) = (unloading(&of_sum), unloading(&of_places));
     let apart = |name, of: &'static str, hats| Rival {
         beside: Some(of),
@@ -269,7 +272,10 @@ impl Seen {
             let end = known.registration.to_sensor(heading);
             [end[0] - origin[0], end[1] - origin[1]]
         };
-        let largest = |signal: &[f64]| signal.iter().copied().fold(0.0, f64::max);
+        // Counts may fall with a press.
+        let largest = |signal: &[f64]| {
+            signal.iter().copied().fold(0.0, |most: f64, one| if one.abs() > most.abs() { one } else { most })
+        };
         let frames = problem.predictor.frames;
         let mut way_mm = 0.0;
         let mut last_mm = None;
@@ -300,7 +306,7 @@ impl Seen {
     }
 
     fn share(&self, bin: usize, element: usize) -> f64 {
-        self.signal(bin, element) / self.largest[bin].max(f64::MIN_POSITIVE)
+        if self.largest[bin] == 0.0 { 0.0 } else { self.signal(bin, element) / self.largest[bin] }
     }
 
     fn offset_from_tip_mm(&self, bin: usize, element: usize) -> [f64; 2] {
@@ -329,12 +335,13 @@ impl Seen {
 
     /// A smooth function of a value of single readings in contact, times another value.
     fn smooth<'a>(seen: &Arc<Self>, value: OfReading, times: OfReading) -> Vec<Direction<'a>> {
-        let loud = |(bin, element): &(usize, usize)| {
-            seen.deep[*bin] && seen.signal(*bin, *element) > SIGNAL_SHARE * seen.largest[*bin]
-        };
+        let loud =
+            |(bin, element): &(usize, usize)| seen.deep[*bin] && seen.share(*bin, *element) > SIGNAL_SHARE;
         let readings = (0..seen.deep.len()).flat_map(|bin| (0..seen.elements).map(move |e| (bin, e)));
-        let knots: Arc<Vec<f64>> =
-            Arc::new(knots(readings.filter(loud).map(|(bin, element)| value(seen, bin, element)).collect()));
+        let knots: Arc<Vec<f64>> = Arc::new(knots(
+            readings.filter(loud).map(|(bin, element)| value(seen, bin, element)).collect(),
+            JITTER,
+        ));
         let column = |knot: usize| -> Direction<'a> {
             let (seen, knots) = (Arc::clone(seen), Arc::clone(&knots));
             Direction::Column(Box::new(move |bins: Range<usize>| {
@@ -355,8 +362,13 @@ impl Seen {
 /// For each knot, the weight of its value in a function that is straight between knots; 0 for bins that are not among those. No knots if
 /// the values do not differ.
 pub(super) fn hats(values: &[f64], among: &[bool]) -> Vec<Vec<f64>> {
+    hats_of(values, among, JITTER)
+}
+
+/// As [`hats`], of values that differ if they do so by more than that.
+fn hats_of(values: &[f64], among: &[bool], jitter: f64) -> Vec<Vec<f64>> {
     let kept = values.iter().zip(among).filter(|(value, among)| **among && value.is_finite());
-    let knots = knots(kept.map(|(value, _)| *value).collect());
+    let knots = knots(kept.map(|(value, _)| *value).collect(), jitter);
     let hat = |knot: usize| {
         let of = |(value, among): (&f64, &bool)| {
             if *among && value.is_finite() { hat(&knots, knot, *value) } else { 0.0 }
@@ -367,13 +379,12 @@ pub(super) fn hats(values: &[f64], among: &[bool]) -> Vec<Vec<f64>> {
 }
 
 /// Quantiles of the values from the least to the greatest, each apart from the one before.
-fn knots(mut values: Vec<f64>) -> Vec<f64> {
+fn knots(mut values: Vec<f64>, jitter: f64) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     let (Some(least), Some(most)) = (values.first().copied(), values.last().copied()) else {
         return Vec::new();
     };
-    // The reported position of a stage at rest still varies slightly.
-    let apart = 1e-3 * (most - least).max(least.abs()).max(most.abs()).max(1.0);
+    let apart = jitter.max(1e-3 * (most - least).max(least.abs()).max(most.abs()));
     let quantiles = (0..KNOTS).map(|knot| values[knot * (values.len() - 1) / (KNOTS - 1)]);
     let mut knots: Vec<f64> = Vec::new();
     for value in quantiles {

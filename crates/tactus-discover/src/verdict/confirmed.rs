@@ -164,8 +164,7 @@ impl Search<'_> {
                         name: known.name,
                         value: *value,
                         // An error greater than the range means that the data do not determine it.
-                        standard_error: Some(*error)
-                            .filter(|error| *error <= known.range[1] - known.range[0]),
+                        standard_error: Some(*error).filter(|error| *error <= problem.scale_of(known).reach),
                     })
                     .collect()
             };

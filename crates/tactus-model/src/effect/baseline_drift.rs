@@ -10,7 +10,7 @@
 //! | `element` | index | -1 | -1, or an element of the array | the element that drifts; -1, or left out: all of them, alike |
 //! | `start_s` | s | 0 | 0 to 1000000 | start of the curve; no fit varies it; may be left out |
 //! | `duration_s` | s | 600 | 1 to 1000000 | from the start to the last knot; `tactus discover` sets it to the length of the data |
-//! | `offset_01_counts` to `offset_16_counts` | counts | 0 | -1000 to 1000 | drift at the knots, `duration_s / 16` apart |
+//! | `offset_01_counts` to `offset_16_counts` | counts | 0 | any | drift at the knots, `duration_s / 16` apart |
 //!
 //! The curve starts at 0, since the baselines belong to the base model. It follows a drift of any shape: a trend, a warm-up, a
 //! random walk. Least squares leave 4 % of the variance of a random walk; 12 knots would leave 5 % and 6 knots 10 %. A drift
@@ -34,22 +34,22 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::element_or_all("element"),
         Parameter::given("start_s", 0.0, [0.0, 1e6]),
         Parameter::real("duration_s", 600.0, [1.0, 1e6]),
-        offset("offset_01_counts"),
-        offset("offset_02_counts"),
-        offset("offset_03_counts"),
-        offset("offset_04_counts"),
-        offset("offset_05_counts"),
-        offset("offset_06_counts"),
-        offset("offset_07_counts"),
-        offset("offset_08_counts"),
-        offset("offset_09_counts"),
-        offset("offset_10_counts"),
-        offset("offset_11_counts"),
-        offset("offset_12_counts"),
-        offset("offset_13_counts"),
-        offset("offset_14_counts"),
-        offset("offset_15_counts"),
-        offset("offset_16_counts"),
+        Parameter::counts("offset_01_counts"),
+        Parameter::counts("offset_02_counts"),
+        Parameter::counts("offset_03_counts"),
+        Parameter::counts("offset_04_counts"),
+        Parameter::counts("offset_05_counts"),
+        Parameter::counts("offset_06_counts"),
+        Parameter::counts("offset_07_counts"),
+        Parameter::counts("offset_08_counts"),
+        Parameter::counts("offset_09_counts"),
+        Parameter::counts("offset_10_counts"),
+        Parameter::counts("offset_11_counts"),
+        Parameter::counts("offset_12_counts"),
+        Parameter::counts("offset_13_counts"),
+        Parameter::counts("offset_14_counts"),
+        Parameter::counts("offset_15_counts"),
+        Parameter::counts("offset_16_counts"),
     ],
     near_twins: &["imprint", "relaxation", "gain-drift", "periodic-interference"],
     acts_by: &[Covariate::Time, Covariate::Press, Covariate::Temperature],
@@ -64,10 +64,6 @@ pub(super) static DEFINITION: Definition = Definition {
         })
     }),
 };
-
-const fn offset(name: &'static str) -> Parameter {
-    Parameter::real(name, 0.0, [-1000.0, 1000.0])
-}
 
 #[derive(Debug)]
 struct BaselineDrift {

@@ -190,6 +190,29 @@ impl Definition {
 }
 
 impl Parameter {
+    /// Greatest number of counts. Any value is allowed in effect: what a count is, differs from sensor to sensor.
+    pub const COUNTS_MAX: f64 = 1e12;
+
+    /// A real number of counts.
+    pub const fn counts(name: &'static str) -> Self {
+        Self::real(name, 0.0, [-Self::COUNTS_MAX, Self::COUNTS_MAX])
+    }
+
+    /// True if it is a number of counts: its range says nothing about what is much or little.
+    pub fn is_counts(&self) -> bool {
+        self.range[1].to_bits() == Self::COUNTS_MAX.to_bits()
+    }
+
+    /// Its range in words.
+    pub fn range_in_words(&self) -> String {
+        let [least, most] = self.range;
+        match (self.is_counts(), least < 0.0) {
+            (true, true) => "any".to_owned(),
+            (true, false) => format!("{least} or more"),
+            (false, _) => format!("{least} to {most}"),
+        }
+    }
+
     /// A real number within a range.
     pub const fn real(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
         Self {

@@ -94,12 +94,13 @@ fn each_parameter_is_explained() {
     for Definition { name: effect, parameters, .. } in REGISTRY {
         let file = format!("{}/src/effect/{}.rs", env!("CARGO_MANIFEST_DIR"), effect.replace('-', "_"));
         let text = std::fs::read_to_string(file).unwrap();
-        for Parameter { name, neutral, range: [least, most], kind, .. } in *parameters {
+        for parameter in *parameters {
+            let Parameter { name, neutral, kind, .. } = parameter;
             let mut rows = text.lines().filter_map(|line| line.strip_prefix("//! | `")?.split_once('`'));
             let row = rows.find(|(first, _)| unnumbered(first) == unnumbered(name));
             let (_, row) = row.unwrap_or_else(|| panic!("{effect}: {name} has no row"));
             if matches!(kind, ParameterKind::Real | ParameterKind::Given) {
-                let values = format!("| {neutral} | {least} to {most} | ");
+                let values = format!("| {neutral} | {} | ", parameter.range_in_words());
                 assert!(row.contains(&values), "{effect}: {name} is {values}");
             }
         }

@@ -6,8 +6,8 @@
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `sine_counts` | counts | 0 | -1000 to 1000 | amplitude of the sine |
-//! | `cosine_counts` | counts | 0 | -1000 to 1000 | amplitude of the cosine |
+//! | `sine_counts` | counts | 0 | any | amplitude of the sine |
+//! | `cosine_counts` | counts | 0 | any | amplitude of the cosine |
 //! | `frequency_hz` | Hz | 10 | 0.001 to 1000 | frequency of the tone |
 //! | `phase_per_column_deg` | degree | 0 | -180 to 180 | phase from one column to the next |
 //!
@@ -30,8 +30,8 @@ pub(super) static DEFINITION: Definition = Definition {
     name: "periodic-interference",
     summary: "a tone is added, such as an alias of the mains",
     parameters: &[
-        Parameter::real("sine_counts", 0.0, [-1000.0, 1000.0]),
-        Parameter::real("cosine_counts", 0.0, [-1000.0, 1000.0]),
+        Parameter::counts("sine_counts"),
+        Parameter::counts("cosine_counts"),
         Parameter::real("frequency_hz", 10.0, [1e-3, 1000.0]),
         Parameter::real("phase_per_column_deg", 0.0, [-180.0, 180.0]),
     ],

@@ -8,9 +8,9 @@
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `step_counts` | counts | 0 | 0 to 1000 | step of the converter; 0: no steps |
-//! | `gap_from_counts` | counts | 0 | -1000000000 to 1000000000 | the code before a gap; may be left out, no fit varies it |
-//! | `gap_counts` | counts | 0 | 0 to 1000000 | from there to the next code that the converter gives, 0: no gap; may be left out |
+//! | `step_counts` | counts | 0 | 0 or more | step of the converter; 0: no steps |
+//! | `gap_from_counts` | counts | 0 | any | the code before a gap; may be left out, no fit varies it |
+//! | `gap_counts` | counts | 0 | 0 or more | from there to the next code that the converter gives, 0: no gap; may be left out |
 //! | `gap_low_share` | - | 1 | 0 to 1 | share of the gap, from below, that is read as the code before it; may be left out |
 //!
 //! A converter with several gaps is as many effects.
@@ -25,9 +25,9 @@ pub(super) static DEFINITION: Definition = Definition {
     name: "quantisation",
     summary: "the converter's steps are coarser than declared, or it leaves out codes",
     parameters: &[
-        Parameter::real("step_counts", 0.0, [0.0, 1000.0]),
-        Parameter::given("gap_from_counts", 0.0, [-1e9, 1e9]),
-        Parameter::given("gap_counts", 0.0, [0.0, 1e6]),
+        Parameter::real("step_counts", 0.0, [0.0, Parameter::COUNTS_MAX]),
+        Parameter::given("gap_from_counts", 0.0, [-Parameter::COUNTS_MAX, Parameter::COUNTS_MAX]),
+        Parameter::given("gap_counts", 0.0, [0.0, Parameter::COUNTS_MAX]),
         Parameter::given("gap_low_share", 1.0, [0.0, 1.0]),
     ],
     near_twins: &["noise_rms_counts"],

@@ -77,7 +77,7 @@ impl OnElement for Saturation {
     fn signal(&mut self, now: Now<'_>, _: &[f64], signal_mm: &mut [f64]) {
         let gains = &now.base.model.response().sensitivity_counts_per_mm;
         let mean = gains.iter().sum::<f64>() / gains.len() as f64;
-        let counts_share = if mean > 0.0 { self.counts_share } else { 0.0 };
+        let counts_share = if mean == 0.0 { 0.0 } else { self.counts_share };
         for (u, gain) in signal_mm.iter_mut().zip(gains).filter(|(u, _)| **u > 0.0) {
             let relative = if counts_share > 0.0 { 1.0 + counts_share * (gain / mean - 1.0) } else { 1.0 };
             *u *= self.loss.kept(*u * relative.max(0.0));

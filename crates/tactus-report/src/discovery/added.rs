@@ -195,6 +195,7 @@ fn value(parameter: &Estimated) -> String {
 fn range(definition: &Definition, found: &Estimated) -> String {
     let parameter = definition.parameters.iter().find(|parameter| parameter.name == found.name);
     match parameter.filter(|_| found.standard_error.is_some()) {
+        Some(parameter) if parameter.is_counts() => parameter.range_in_words(),
         Some(parameter) => parameter.range.map(|end| short(end, 6)).join(" to "),
         None => String::new(),
     }

@@ -348,7 +348,8 @@ const FAULTS: [&str; 2] = ["miswired", "quantisation"];
 fn flag(definition: &Definition, found: &Estimated) -> Option<String> {
     let known = definition.parameters.iter().find(|known| known.name == found.name)?;
     let Estimated { name, value, standard_error } = *found;
-    let slack = BOUND_SHARE * (known.range[1] - known.range[0]);
+    // A number of counts has no bound.
+    let slack = if known.is_counts() { 0.0 } else { BOUND_SHARE * (known.range[1] - known.range[0]) };
     let is_neutral = (value - known.neutral).abs() <= slack;
     let is_at_end = known.range.into_iter().any(|end| (value - end).abs() <= slack);
     let Some(error) = standard_error else {

@@ -172,13 +172,16 @@ fn before_rounding(d: f64, step_counts: f64) -> f64 {
     f64::midpoint(least, most)
 }
 
-/// True if nearly all readings are whole steps. Means of several readings are not.
+/// True if nearly all readings of an element are whole steps apart. Means of several readings are not.
 fn is_in_steps(frames: &Frames, step_counts: f64) -> bool {
-    let is_whole = |counts: &&f32| {
-        let steps = f64::from(**counts) / step_counts;
-        (steps - steps.round()).abs() < 0.02
+    let first = &frames.counts[..frames.elements.min(frames.counts.len())];
+    let is_whole = |(counts, first): &(&f32, &f32)| {
+        let steps = f64::from(**counts - **first) / step_counts;
+        // Readings that are no binary fractions are rounded.
+        let rounding = f64::from(counts.abs().max(first.abs()) * f32::EPSILON) / step_counts;
+        (steps - steps.round()).abs() < 0.02 + rounding
     };
-    let whole = frames.counts.iter().filter(is_whole).count();
+    let whole = frames.counts.iter().zip(first.iter().cycle()).filter(is_whole).count();
     step_counts > 0.0 && whole as f64 > 0.99 * frames.counts.len() as f64
 }
 

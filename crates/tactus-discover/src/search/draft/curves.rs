@@ -96,12 +96,23 @@ impl Curve {
 
 /// Covariance of linear combinations of columns with these products.
 fn covariance(gram: &DMatrix<f64>, columns: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    let products = columns.transpose() * gram * columns;
+    let Some(inverse) = inverse(&(columns.transpose() * gram * columns)) else { return Vec::new() };
+    inverse.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+/// The inverse of products of columns, with the ridge that each column has in the unit in which its square is 1: a column may have any unit.
+fn inverse(products: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let size = products.nrows();
     let most = (0..size).map(|i| products[(i, i)]).fold(0.0, f64::max);
-    let held = products + DMatrix::identity(size, size) * (RIDGE * most);
-    let Some(inverse) = held.try_inverse() else { return Vec::new() };
-    inverse.row_iter().map(|row| row.iter().copied().collect()).collect()
+    // What nothing shows has the unit of the others.
+    let unit = |i: usize| {
+        let own = products[(i, i)];
+        if own > 0.0 { own.sqrt() } else { most.sqrt() }
+    };
+    let units = DVector::from_fn(size, |i, _| unit(i).recip());
+    let scaled = DMatrix::from_fn(size, size, |i, j| products[(i, j)] * units[i] * units[j]);
+    let inverse = (scaled + DMatrix::identity(size, size) * RIDGE).try_inverse()?;
+    Some(DMatrix::from_fn(size, size, |i, j| inverse[(i, j)] * units[i] * units[j]))
 }
 
 /// The curve as the law that costs least, if it misses at most so many nats more than noise makes it miss; else as a table.
@@ -190,10 +201,8 @@ fn fitted(places: &[f64], curve: &Curve, kind: Kind, shape: f64) -> Option<Price
     let constant = DVector::from_element(places.len(), 1.0);
     let both = DMatrix::from_columns(&[column.clone(), constant]);
     let products = both.transpose() * &curve.gram * &both;
-    let most = products[(0, 0)].max(products[(1, 1)]);
-    let held = &products + DMatrix::identity(2, 2) * (RIDGE * most);
     let wanted = both.transpose() * &curve.gram * &curve.values;
-    let solved = held.try_inverse()? * wanted;
+    let solved = inverse(&products)? * wanted;
     let with = curve.cost(&(&both * &solved));
     let without = curve.cost(&(&column * solved[0]));
     if let Law::Linear { .. } = unit {

@@ -123,3 +123,32 @@ fn a_table_with_a_constant_that_nothing_shows_begins_at_nothing() {
     assert_eq!(values, [0.0, 0.0, 3.0, 0.0, -3.0, 0.0, 0.0]);
     assert!(found.knots.iter().all(|[_, _, error]| *error < 0.06), "{:?}", found.knots);
 }
+
+/// Counts are whatever a converter makes of them.
+#[test]
+fn a_law_does_not_depend_on_the_unit_of_its_covariate() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    for law in [
+        Law::Linear { offset: 2.0, slope: 5.0 },
+        Law::Power { scale: 20.0, exponent: 2.6 },
+        Law::Exponential { scale: 6.0, length: 0.15 },
+    ] {
+        let scatter = DVector::from_fn(AT.len(), |_, _| 0.05 * rng.random_range(-1.0..1.0));
+        let one = Curve { values: &curve(&law, 0.05).values + scatter, ..curve(&law, 0.05) };
+        let in_unit = |unit: f64| {
+            let places = AT.iter().map(|at| unit * at).collect();
+            let atom = Atom::of(Carrier::Counts, When::Always, Covariate::Counts, places);
+            let found = reduced(&atom, &one, 5.0);
+            let values: Vec<f64> = AT.iter().map(|at| found.law.value(&[unit * at])).collect();
+            (found.law.name(), values)
+        };
+        let (name, expected) = in_unit(1.0);
+        for unit in [1e-5, 1.0 / 4095.0, 1e3, 1e7] {
+            let (other, values) = in_unit(unit);
+            assert_eq!(other, name, "{law:?} in {unit}");
+            for (value, expected) in values.iter().zip(&expected) {
+                assert!((value - expected).abs() < 1e-6, "{law:?} in {unit}: {value}, not {expected}");
+            }
+        }
+    }
+}

@@ -112,17 +112,19 @@ impl Sight {
 
     /// Places of knots: quantiles of the covariate's values.
     pub(super) fn knots(&self, of: Acting, count: usize) -> Vec<f64> {
+        let (_, when, covariate) = of;
         let mut values = self.values(of);
         values.sort_by(f64::total_cmp);
-        if let (_, When::Always, Covariate::Height) = of {
+        if (when, covariate) == (When::Always, Covariate::Height) {
             // It is 0 as long as the tool touches, in most frames.
             values.dedup();
         }
         let (Some(least), Some(most)) = (values.first().copied(), values.last().copied()) else {
             return Vec::new();
         };
-        // The reported position of a stage at rest still varies slightly.
-        let apart = (APART_SHARE * (most - least)).max(1e-3 * most.abs().max(least.abs()));
+        // The reported position of a stage at rest still varies slightly. Counts may begin anywhere.
+        let jitter = if covariate == Covariate::Counts { 0.0 } else { 1e-3 * most.abs().max(least.abs()) };
+        let apart = (APART_SHARE * (most - least)).max(jitter);
         let mut knots: Vec<f64> = Vec::new();
         for knot in 0..count {
             let value = values[knot * (values.len() - 1) / (count - 1).max(1)];

@@ -57,17 +57,17 @@ pub(super) fn sentence(draft: &Draft) -> String {
         Law::Linear { .. } => "in a straight line".to_owned(),
         Law::Power { exponent, .. } => format!("as its power {exponent:.2}"),
         Law::Exponential { length, .. } => {
-            format!("falling off with a length of {length:.3} {}", unit(draft))
+            format!("falling off with a length of {} {}", number(*length, 3), unit(draft))
         }
         Law::Saturating { length, .. } => {
-            format!("levelling off with a length of {length:.3} {}", unit(draft))
+            format!("levelling off with a length of {} {}", number(*length, 3), unit(draft))
         }
-        Law::Threshold { at, .. } => format!("at once from {at:.3} {} on", unit(draft)),
+        Law::Threshold { at, .. } => format!("at once from {} {} on", number(*at, 3), unit(draft)),
         Law::Periodic { per_unit, .. } => {
-            format!("as a tone with a period of {:.4} {}", 1.0 / per_unit, unit(draft))
+            format!("as a tone with a period of {} {}", number(1.0 / per_unit, 4), unit(draft))
         }
         Law::Logarithm { length, .. } => {
-            format!("as a logarithm with a length of {length:.3} {}", unit(draft))
+            format!("as a logarithm with a length of {} {}", number(*length, 3), unit(draft))
         }
         Law::Table { .. } => "along a free curve".to_owned(),
     };
@@ -120,6 +120,14 @@ fn extent(draft: &Draft) -> [f64; 2] {
 fn ends(values: &[f64]) -> [f64; 2] {
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
     [least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+}
+
+/// A number with this many decimals; with more where it would have less than two digits.
+fn number(value: f64, places: usize) -> String {
+    let digits = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 12")]
+    let least = (1.0 - digits).clamp(0.0, 12.0) as usize;
+    format!("{value:.0$}", places.max(least))
 }
 
 /// Both ends of a range with the same decimals: the larger one has three digits.

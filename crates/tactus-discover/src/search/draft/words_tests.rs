@@ -35,6 +35,25 @@ fn a_draft_is_told_in_one_sentence() {
 }
 
 #[test]
+fn small_numbers_are_told_too() {
+    let by_counts = |law| Draft {
+        name: "draft-1".into(),
+        sentence: String::new(),
+        carrier: Carrier::Counts,
+        when: When::Always,
+        covariates: vec![Covariate::Counts],
+        ranges: vec![[0.0, 4e-4]],
+        law,
+        weights: None,
+    };
+    let jump = sentence(&by_counts(Law::Threshold { scale: 6e-6, at: 2.5e-4 }));
+    assert!(jump.contains("at once from 0.00025 counts on"), "{jump}");
+    let tone = Law::Periodic { offset: 0.0, sine: 1e-6, cosine: 0.0, per_unit: 8e4 };
+    let tone = sentence(&by_counts(tone));
+    assert!(tone.contains("with a period of 0.000013 counts"), "{tone}");
+}
+
+#[test]
 fn both_ends_of_a_range_have_the_same_decimals_and_a_hair_beside_zero_is_zero() {
     let power = |scale: f64| Draft {
         name: "draft-1".into(),

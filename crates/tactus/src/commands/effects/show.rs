@@ -55,10 +55,7 @@ fn unknown(library: &Library, name: &str) -> Failure {
 }
 
 fn show_known(known: &Definition) {
-    let parameters = known.parameters.iter().map(|one| {
-        let [least, most] = one.range;
-        format!("{} ({least} to {most})", one.name)
-    });
+    let parameters = known.parameters.iter().map(|one| format!("{} ({})", one.name, one.range_in_words()));
     print_fields(&[
         ("effect", known.name.to_owned()),
         ("what it is", known.summary.to_owned()),
