@@ -412,9 +412,10 @@ discovery-slice:
     target/dist/tactus-bench evidence run --size slice --check \
         --work target/evidence/slice/work --labels target/evidence/slice/labels
 
-# Tests of discovery that CI is too short for: drafts of further physics, names that a draft outdoes, a refuted draft, two parts of a measured run.
+# Tests of discovery that CI is too short for: drafts of further physics, names that a draft outdoes, a refuted draft, two parts of a measured run, a sensor
+# in volts.
 long-tests: build
-    cargo test --workspace --lib --test e2e -- --ignored drafting:: discover::
+    cargo test --workspace --lib --test e2e -- --ignored drafting:: discover:: import::
 
 # The part of that which CI runs, 11 sets, with the programs that the tests have built.
 discovery-sample: build

@@ -37,7 +37,7 @@
 //! | converter.rs | `READINGS_LEAST` | `20` | convention | fewer may lie on a lattice by chance |
 //! | converter.rs | `WIDER` | `1.4` | convention | between the declared step and twice that |
 //! | converter.rs | `OFF_MAX` | `0.02` | convention | counts are stored in single precision |
-//! | converter.rs | `ROUNDED_MAX` | `0.08` | convention | with `OFF_MAX` a tenth of a step, from 16 bits on that are no whole counts |
+//! | converter.rs | `ROUNDED_MAX` | `0.08` | convention | with `OFF_MAX` a tenth of a step; up to 20 bits that are no whole counts |
 //! | converter.rs | `GAPS_MAX` | `512` | cost | a loop for each |
 //! | converter.rs | `AT_END_LEAST` | `10` | convention | fewer do not tell an end of a gap |
 //! | converter.rs | `CHANCE` | `1e-6` | convention | far below any level in use, times what was looked at |

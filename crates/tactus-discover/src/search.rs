@@ -29,6 +29,7 @@
 //! |---|---|---|---|---|
 //! | candidates.rs | `VALUES_MANY` | `5` | cost | shapes of a grid; a fit finds what is between |
 //! | candidates.rs | `VALUES_FEW` | `3` | cost | the same |
+//! | candidates.rs | `SHORTEST_S` | `0.02` | convention | less than a frame of the paper's sensor |
 //! | candidates.rs | `CROSSED_SHARE` | `0.5` | convention | half of a signal is more another's |
 //! | contests.rs | `TAKEN_SHARE` | `0.3` | measured | `evidence contests`: 11 right and 4 wrong names at a z of 40 (page of `contests`) |
 //! | contests.rs | `BESIDE_SHARE` | `0.17` | measured | the geometric mean of 0.144, beside a right name of a real sensor, and 0.20, beside wrong ones; 0.1 before the real one |

@@ -171,6 +171,11 @@ fn fill(
         assumed.push("step_counts = 1, because every reading is a whole number".to_owned());
         array.insert("step_counts".to_owned(), 1.0.into());
     }
+    if !array.contains_key("least_counts") && (mapping.counts.is_subtracted || readings.are_signed()) {
+        let full_scale_counts = array["full_scale_counts"].as_f64().unwrap_or(0.0);
+        assumed.push("least_counts = -full_scale_counts, because readings may be below 0".to_owned());
+        array.insert("least_counts".to_owned(), (-full_scale_counts).into());
+    }
     let registration = keys.get_mut("registration").and_then(Value::as_object_mut);
     registration
         .ok_or_else(|| wrong("rig.registration", "a table"))?
@@ -246,6 +251,10 @@ impl Readings<'_> {
 
     fn are_whole(&self) -> bool {
         self.runs.iter().flat_map(|run| &run.counts).all(|count| count.fract() == 0.0)
+    }
+
+    fn are_signed(&self) -> bool {
+        self.runs.iter().flat_map(|run| &run.counts).any(|count| *count < 0.0)
     }
 
     /// The median of each element while nothing touches.

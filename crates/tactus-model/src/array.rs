@@ -11,6 +11,7 @@ pub struct Array {
     col_centres_mm: Vec<f64>,
     row_centres_mm: Vec<f64>,
     rate_hz: f64,
+    least_counts: f64,
     full_scale_counts: f64,
     step_counts: f64,
 }
@@ -29,6 +30,11 @@ pub enum ArrayError {
         field: &'static str,
         value: f64,
     },
+    /// The least reading is no number below the greatest.
+    #[error(
+        "least_counts must be a finite number below full_scale_counts ({full_scale_counts}), not {least_counts}"
+    )]
+    LeastCounts { least_counts: f64, full_scale_counts: f64 },
     /// Centres do not rise, or elements overlap.
     #[error("{field}[{index}] must exceed its predecessor by at least one element size ({element_mm} mm)")]
     Overlap {
@@ -84,9 +90,22 @@ impl Array {
             col_centres_mm,
             row_centres_mm,
             rate_hz,
+            least_counts: 0.0,
             full_scale_counts,
             step_counts,
         })
+    }
+
+    /// The same array, whose readings begin at another count than 0, such as those of a signed converter.
+    ///
+    /// # Errors
+    /// [`ArrayError::LeastCounts`] if that is no finite number below full scale.
+    pub fn with_least_counts(self, least_counts: f64) -> Result<Self, ArrayError> {
+        let full_scale_counts = self.full_scale_counts;
+        if !(least_counts.is_finite() && least_counts < full_scale_counts) {
+            return Err(ArrayError::LeastCounts { least_counts, full_scale_counts });
+        }
+        Ok(Self { least_counts, ..self })
     }
 
     /// The DigiTacts array of the paper (Fig. 1): two sensors of 6 x 4 elements side by side.
@@ -100,6 +119,7 @@ impl Array {
             col_centres_mm: vec![0.9, 2.9, 5.1, 7.1, 9.1, 11.1, 13.3, 15.3],
             row_centres_mm: vec![0.9, 2.9, 4.9, 6.9, 8.9, 10.9],
             rate_hz: 30.0,
+            least_counts: 0.0,
             full_scale_counts: 4095.0,
             step_counts: 1.0,
         }
@@ -132,6 +152,7 @@ impl Array {
             col_centres_mm: centres(cols),
             row_centres_mm: centres(rows),
             rate_hz: 30.0,
+            least_counts: 0.0,
             full_scale_counts: 4095.0,
             step_counts: 1.0,
         }
@@ -181,6 +202,11 @@ impl Array {
     /// Frames per second.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
+    }
+
+    /// Least reading; 0 unless said otherwise.
+    pub fn least_counts(&self) -> f64 {
+        self.least_counts
     }
 
     /// Largest reading.

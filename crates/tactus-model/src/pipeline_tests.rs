@@ -123,10 +123,11 @@ fn with_knots(definition: &'static Definition, value: impl Fn(f64) -> f64) -> Op
     Some(Effect::of_knots(definition, parameters, Knots { at, values }).unwrap())
 }
 
-/// An effect at a tenth of its range.
+/// An effect at a tenth of its range; 100 counts.
 fn strong(definition: &'static Definition) -> Effect {
     definition.parameters.iter().fold(Effect::neutral(definition), |effect, parameter| {
         let [least, most] = parameter.range;
+        let most = if parameter.is_counts() { 1000.0 } else { most };
         let value = if parameter.name == "element" { 20.0 } else { 0.9 * parameter.neutral + 0.1 * most };
         // One that starts later is not seen yet.
         if ["answers_for", "start_s"].contains(&parameter.name) {

@@ -8,21 +8,26 @@ const STEPS_ROUNDED: f64 = 1e-9;
 /// The converter behind every element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readout {
-    full_scale_counts: f64,
+    /// The least and the greatest reading, in whole steps.
+    ends_steps: [f64; 2],
     step_counts: f64,
 }
 
 impl Readout {
     /// The converter that an array's description states.
     pub fn of(array: &Array) -> Self {
-        Self { full_scale_counts: array.full_scale_counts(), step_counts: array.step_counts() }
+        let step_counts = array.step_counts();
+        let [least, most] = [array.least_counts(), array.full_scale_counts()].map(|end| end / step_counts);
+        let ends_steps =
+            [(least - STEPS_ROUNDED * least.abs()).ceil(), (most + STEPS_ROUNDED * most.abs()).floor()];
+        Self { ends_steps, step_counts }
     }
 
-    /// The reading for `counts` plus `noise_counts`, a noise sample that the caller draws: limited to 0 and full scale, and
+    /// The reading for `counts` plus `noise_counts`, a noise sample that the caller draws: limited to the array's least and greatest, and
     /// rounded to the nearest step.
     pub fn read(&self, counts: f64, noise_counts: f64) -> f64 {
-        let most_steps = (self.full_scale_counts / self.step_counts * (1.0 + STEPS_ROUNDED)).floor();
-        let steps = ((counts + noise_counts) / self.step_counts).clamp(0.0, most_steps);
+        let [least, most] = self.ends_steps;
+        let steps = ((counts + noise_counts) / self.step_counts).clamp(least.min(most), most);
         steps.round() * self.step_counts
     }
 }

@@ -51,6 +51,9 @@ fn effects_come_with_their_errors_and_evidence() {
 #[test]
 fn what_is_written_reads_back_to_the_bit() {
     let mut model = Model::from_toml(&grown()).unwrap();
+    // What has no sign is written as ever.
+    assert!(!model.to_toml().unwrap().contains("least_counts"));
+    model.base.array = model.base.array.with_least_counts(-0.1).unwrap();
     model.base.response.sensitivity_counts_per_mm = (0..48).map(|k| 1e3 / f64::from(k + 3)).collect();
     model.base.psf.sigma_per_mm = 0.1 + 0.2;
     model.base.psf_se = [Some(1e-17), None];

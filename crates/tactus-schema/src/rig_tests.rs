@@ -57,6 +57,24 @@ fn an_element_that_could_saturate_before_its_limit_is_refused() {
     );
 }
 
+/// From 4095 down to -1000 counts, 95 % of the range end at -745; the elements rest at 100 and fall.
+#[test]
+fn an_element_that_falls_has_its_end_at_the_least_count() {
+    let falls = SIM
+        .replace("full_scale_counts = 4095", "least_counts = -1000\nfull_scale_counts = 4095")
+        .replace("sensitivity_counts_per_mm = 1000.0", "sensitivity_counts_per_mm = -1000.0");
+    assert_ne!(falls.matches("-1000").count(), 1, "both are replaced");
+    let limit = |counts: u32| {
+        falls.replace("element_max_counts = 2000.0", &format!("element_max_counts = {counts}.0"))
+    };
+    let rig = Rig::from_toml(&limit(345)).unwrap();
+    assert_eq!(Rig::from_json(&rig.to_json()).unwrap().array, rig.array);
+    let error = Rig::from_toml(&limit(346)).unwrap_err().to_string();
+    assert!(error.starts_with("envelope.element_max_counts") && error.contains("only 845"), "{error}");
+    let error = refused("full_scale_counts = 4095", "least_counts = 5000\nfull_scale_counts = 4095");
+    assert!(error.contains("least_counts") && error.contains("below full_scale_counts"), "{error}");
+}
+
 #[test]
 fn a_simulated_element_has_one_fault_at_most() {
     let with = |faults: &str| {

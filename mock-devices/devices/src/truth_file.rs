@@ -154,13 +154,14 @@ fn can_act(effect: &Effect) -> Result<(), TruthError> {
 fn describe(array: &Array) -> String {
     let [[left, right], [bottom, top]] = array.extent_mm();
     format!(
-        "{:?} ({} x {} elements on {:.1} x {:.1} mm, {} Hz, {} counts in steps of {})",
+        "{:?} ({} x {} elements on {:.1} x {:.1} mm, {} Hz, {} to {} counts in steps of {})",
         array.name(),
         array.rows(),
         array.cols(),
         right - left,
         top - bottom,
         array.rate_hz(),
+        array.least_counts(),
         array.full_scale_counts(),
         array.step_counts()
     )

@@ -40,7 +40,9 @@ pub struct ArrayExpectation {
     pub cols: usize,
     /// Frames per second to request. Missing frames are counted against it.
     pub rate_hz: f64,
-    /// Counts at the end of an element's range. A frame with such an element is marked as saturated.
+    /// Least count of an element; 0 for one whose readings have no sign.
+    pub least_counts: f64,
+    /// Counts at the end of an element's range. A frame with an element at either end is marked as saturated.
     pub full_scale_counts: f64,
     /// True if no physical sensor is read.
     pub simulated: bool,
@@ -103,9 +105,15 @@ impl ArrayExpectation {
             rows: rig.array.rows(),
             cols: rig.array.cols(),
             rate_hz: rig.array.rate_hz(),
+            least_counts: rig.array.least_counts(),
             full_scale_counts: rig.array.full_scale_counts(),
             simulated: rig.simulated,
         }
+    }
+
+    /// True if an element reads so at an end of its range. Many sensors rest at 0, so that it is no end.
+    fn is_at_an_end(&self, counts: f64) -> bool {
+        counts.abs() >= self.full_scale_counts || counts <= self.least_counts && self.least_counts != 0.0
     }
 
     /// What the service says of the array, read over a link of this protocol and transport. `tick_ns`: tick of the device's clock, 0 if
@@ -294,7 +302,7 @@ impl Driver {
         }
         let counts: Arc<[f32]> =
             if reading.bad.is_empty() { reading.counts } else { self.held.as_slice().into() };
-        if counts.iter().any(|count| f64::from(count.abs()) >= self.expect.full_scale_counts) {
+        if counts.iter().any(|count| self.expect.is_at_an_end(f64::from(*count))) {
             flags = flags.with(FrameFlags::SATURATED);
         }
         if !reading.bad.is_empty() {

@@ -33,6 +33,7 @@ fn expectation() -> ArrayExpectation {
         rows: 1,
         cols: 2,
         rate_hz: 30.0,
+        least_counts: 0.0,
         full_scale_counts: 4095.0,
         simulated: true,
     }
@@ -202,6 +203,20 @@ async fn the_end_of_the_range_is_marked() {
     let mut device = plug_in(&mut port).await;
     device.write_all(&encode_frame(0, &[4094, 100], false)).await.unwrap();
     device.write_all(&encode_frame(33, &[4095, 100], false)).await.unwrap();
+    connected(&mut sensor).await;
+    assert!(!frame(&mut sensor).await.flags.contains(FrameFlags::SATURATED));
+    assert_eq!(frame(&mut sensor).await.flags, FrameFlags::SATURATED);
+}
+
+#[tokio::test(start_paused = true)]
+async fn so_is_the_other_end() {
+    let (connector, mut port) = pair("sensor");
+    let expect = ArrayExpectation { least_counts: 20.0, ..expectation() };
+    let mut sensor =
+        SensorDriver::start(SensorCodec::default(), Box::new(connector), expect, Clock::paused());
+    let mut device = plug_in(&mut port).await;
+    device.write_all(&encode_frame(0, &[21, 100], false)).await.unwrap();
+    device.write_all(&encode_frame(33, &[20, 100], false)).await.unwrap();
     connected(&mut sensor).await;
     assert!(!frame(&mut sensor).await.flags.contains(FrameFlags::SATURATED));
     assert_eq!(frame(&mut sensor).await.flags, FrameFlags::SATURATED);

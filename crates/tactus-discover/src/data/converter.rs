@@ -23,9 +23,9 @@ const READINGS_LEAST: usize = 20;
 /// Least ratio of the lattice's step to the declared one.
 const WIDER: f64 = 1.4;
 /// Greatest distance of a reading from the lattice, as a share of a step.
-const OFF_MAX: f64 = 0.02;
-/// The part of that which the rounding of readings may add: a step that is nearly lost in it is none.
-const ROUNDED_MAX: f64 = 0.08;
+pub(super) const OFF_MAX: f64 = 0.02;
+/// Readings are rounded by at most so much of a step; a step that is nearly lost in that is not seen.
+pub(super) const ROUNDED_MAX: f64 = 0.08;
 /// Gaps that are looked at, at most; with more, readings are too few to show codes.
 const GAPS_MAX: usize = 512;
 /// A code at the end of a gap has at least so many readings.
@@ -115,8 +115,8 @@ impl Frequencies {
         if readings.len() < READINGS_LEAST {
             return None;
         }
-        // The full scale need not be a whole number of steps.
-        let step = lattice_step(&readings[..readings.len() - 1])?;
+        // The ends of the range need not be a whole number of steps apart from the others.
+        let step = lattice_step(&readings[1..readings.len() - 1])?;
         (step >= WIDER * declared_counts.max(f64::MIN_POSITIVE)).then(|| {
             let chance = (declared_counts / step).max(1e-3).powf(readings.len() as f64 - 2.0);
             Converter { fault: Fault::WiderSteps(step), p_value: chance.max(f64::MIN_POSITIVE) }
@@ -170,22 +170,31 @@ impl Frequencies {
     }
 }
 
-/// The step of a lattice on which all of these rising readings lie, if they lie on one. In steps that are no binary fractions each reading is
-/// rounded, so that a difference of two says the step only nearly: as far as it reaches the readings are numbered, by which it is said anew.
+/// The step of a lattice on which all of these rising readings lie, if they lie on one.
+///
+/// In a unit in which a step is no binary fraction each reading is rounded, so that a difference of two says the step only nearly. The smallest
+/// differences are surely one step each or a few; what they say together tells how many steps a greater one has, and so on.
 fn lattice_step(readings: &[f64]) -> Option<f64> {
     let (first, last) = (*readings.first()?, *readings.last()?);
-    let mut step = readings.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
-    let rounding = last.abs().max(first.abs()) * f64::from(f32::EPSILON);
-    let off_max = |step: f64| OFF_MAX * step + rounding.min(ROUNDED_MAX * step);
-    let number = |reading: f64, step: f64| ((reading - first) / step).round();
-    for reading in readings.iter().skip(1) {
-        let off = reading - first - number(*reading, step) * step;
-        if off.abs() > off_max(step) {
+    let are_exact = readings.iter().all(|reading| reading.fract() == 0.0);
+    let rounding = if are_exact { 0.0 } else { last.abs().max(first.abs()) * f64::from(f32::EPSILON) };
+    let mut apart: Vec<f64> = readings.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    apart.sort_by(f64::total_cmp);
+    let (mut sum, mut steps) = (0.0, 0.0);
+    for one in apart {
+        let step = if steps > 0.0 { sum / steps } else { one };
+        if rounding > ROUNDED_MAX * step {
             return None;
         }
-        step = (reading - first) / number(*reading, step);
+        sum += one;
+        steps += (one / step).round();
     }
-    Some(step)
+    let step = sum / steps;
+    let is_on = |reading: &f64| {
+        let steps = (reading - first) / step;
+        (steps - steps.round()).abs() * step <= OFF_MAX * step + rounding
+    };
+    (steps > 0.0 && readings.iter().all(is_on)).then_some(step)
 }
 
 /// For each gap, the logarithm of the probability that no reading is inside, had the converter those codes: of an element the first crossing in

@@ -29,7 +29,11 @@ fn row(press: i32, t_ns: i64, counts: &[f32]) -> RowView<'_> {
 }
 
 fn step(frames: &Frames) -> Option<(f64, f64)> {
-    match Converter::seen(frames, 1.0)? {
+    step_of(frames, 1.0)
+}
+
+fn step_of(frames: &Frames, declared_counts: f64) -> Option<(f64, f64)> {
+    match Converter::seen(frames, declared_counts)? {
         Converter { fault: Fault::WiderSteps(step_counts), p_value } => Some((step_counts, p_value)),
         Converter { .. } => None,
     }
@@ -55,6 +59,30 @@ fn steps_are_seen_in_any_unit() {
         assert!((step - 4.0).abs() < 1e-5, "unit {unit}: {step}");
         assert_eq!(seen(1.0), None, "unit {unit}");
     }
+}
+
+/// A dead element reads 0, far below the others, and single codes are not seen.
+#[test]
+fn steps_are_seen_beyond_a_gap_of_codes() {
+    for (bits, volts) in [(12, 3.3), (12, 5.0), (14, 3.3), (16, 3.3)] {
+        let unit = volts / f64::from(2_i32.pow(bits));
+        let first = 2_i32.pow(bits) * 2 / 5;
+        let codes = (0..1000).filter(|k| k % 7 != 3).map(|k| first + 4 * k).chain([0, 0]);
+        #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
+        let frames = readings(codes.map(|code| (unit * f64::from(code)) as f32));
+        let Some(Converter { fault: Fault::WiderSteps(step), .. }) = Converter::seen(&frames, unit) else {
+            panic!("{bits} bits of {volts} V");
+        };
+        assert!((step / unit - 4.0).abs() < 1e-4, "{bits} bits of {volts} V: {step}");
+    }
+}
+
+/// From 2 on, single precision has steps of 2.4e-7, wider than those of this converter.
+#[test]
+fn the_steps_of_single_precision_are_no_converters() {
+    #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
+    let frames = readings((0..1000).map(|k| (2.2 + 2.5 / f64::from(1 << 24) * f64::from(3 * k)) as f32));
+    assert!(step_of(&frames, 2.5 / f64::from(1 << 24)).is_none());
 }
 
 #[test]

@@ -28,10 +28,14 @@ pub(crate) struct Predictor<'a> {
 /// Greatest number of cached images of 48 elements, about 130 MB.
 const IMAGES_MAX: usize = 200_000;
 
-/// The least count that the converter of these readings gives. One that reads below 0 does not end there, such as where a zero is subtracted.
-fn least_counts(readings: &Frames) -> f64 {
-    let ends_at_0 = readings.counts.iter().all(|counts| *counts >= 0.0 || counts.is_nan());
-    if ends_at_0 { 0.0 } else { f64::NEG_INFINITY }
+/// The least count that the converter of these readings gives. One that reads below its declared end does not end there, such as where a zero
+/// is subtracted.
+fn least_counts(known: &Known, readings: &Frames) -> f64 {
+    let declared = known.array.least_counts();
+    // A reading at the end is rounded.
+    let below = declared - 0.5 * known.array.step_counts();
+    let is_below = |counts: &f32| f64::from(*counts) < below;
+    if readings.counts.iter().any(is_below) { f64::NEG_INFINITY } else { declared }
 }
 
 /// An empty cache of images, with the same number of values for every array.
@@ -52,13 +56,13 @@ impl<'a> Predictor<'a> {
         bins: &'a Bins,
         images: &Arc<Images>,
     ) -> Self {
-        let (images, least_counts) = (Arc::clone(images), least_counts(frames));
+        let (images, least_counts) = (Arc::clone(images), least_counts(known, frames));
         Self { known, frames, bins, images, least_counts, work: Arc::default() }
     }
 
     /// The same with the converter that gave other readings.
     pub(crate) fn read_as(self, readings: &Frames) -> Self {
-        Self { least_counts: least_counts(readings), ..self }
+        Self { least_counts: least_counts(self.known, readings), ..self }
     }
 
     /// How much was computed so far, in predicted readings, each counted once and once more for each effect of its model. It depends on the

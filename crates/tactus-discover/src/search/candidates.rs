@@ -11,6 +11,8 @@ use crate::fit::{Fitted, Free, Problem, Term, places, table_places};
 /// Number of grid values of a shape parameter that spans orders of magnitude, and of any other or a ratio of times.
 const VALUES_MANY: usize = 5;
 const VALUES_FEW: usize = 3;
+/// Time from which a grid begins, unless frames follow one another faster.
+const SHORTEST_S: f64 = 0.02;
 
 /// What a line in the spectrum gives beside the frequency.
 const PHASE: &str = "phase_per_column_deg";
@@ -83,7 +85,9 @@ impl Candidate {
             } else if acts {
                 amplitudes.push(parameter);
             } else {
-                let values = grid(known.name, range, known.neutral, problem.extent.duration_s);
+                let times_s =
+                    [interval_s(problem.predictor.frames).min(SHORTEST_S), problem.extent.duration_s];
+                let values = grid(known.name, range, known.neutral, times_s);
                 shapes = cross(&shapes, parameter, &values);
             }
         }
@@ -212,8 +216,8 @@ fn cross(shapes: &[Term], parameter: usize, values: &[f64]) -> Vec<Term> {
     shapes.iter().flat_map(|shape| values.iter().map(move |value| set(shape, *value))).collect()
 }
 
-/// Values of a shape parameter at which fits start.
-fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> {
+/// Values of a shape parameter at which fits start; times lie between these.
+fn grid(name: &str, range: [f64; 2], neutral: f64, [shortest_s, longest_s]: [f64; 2]) -> Vec<f64> {
     let [mut least, mut most] = range;
     if name == "spread_ratio" {
         // Several shapes with different times have any spread together.
@@ -226,8 +230,8 @@ fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> 
     let is_time = name.ends_with("_s") && !name.ends_with("_per_s");
     if is_time {
         // The data do not show anything faster than a frame or slower than their duration.
-        most = most.min(duration_s);
-        least = least.max(0.02).min(most);
+        most = most.min(longest_s);
+        least = least.max(shortest_s).min(most);
     }
     let ratio = most / least;
     if !(least > 0.0 && ratio.is_finite()) {

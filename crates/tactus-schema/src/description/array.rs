@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use tactus_model::{Array, ArrayError};
 
+use super::number::finite;
 use super::{WrongField, wrong};
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -22,6 +23,9 @@ pub(crate) struct RawArray {
     row_centres_mm: Vec<f64>,
     /// Frames per second of the device.
     rate_hz: f64,
+    /// Least reading, below 0 where readings have a sign.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    least_counts: f64,
     /// Greatest reading.
     full_scale_counts: f64,
     /// Step of the converter.
@@ -38,6 +42,7 @@ impl RawArray {
             col_centres_mm: array.col_centres_mm().to_vec(),
             row_centres_mm: array.row_centres_mm().to_vec(),
             rate_hz: array.rate_hz(),
+            least_counts: array.least_counts(),
             full_scale_counts: array.full_scale_counts(),
             step_counts: array.step_counts(),
         }
@@ -55,7 +60,7 @@ impl RawArray {
                 return Err(wrong(format!("{field}.{name}"), problem).into());
             }
         }
-        Ok(Array::new(
+        let array = Array::new(
             self.name,
             self.element_mm,
             self.col_centres_mm,
@@ -63,6 +68,13 @@ impl RawArray {
             self.rate_hz,
             self.full_scale_counts,
             self.step_counts,
-        )?)
+        )?;
+        let least_counts = finite(format!("{field}.least_counts"), self.least_counts)?;
+        Ok(array.with_least_counts(least_counts)?)
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_zero(counts: &f64) -> bool {
+    *counts == 0.0
 }

@@ -180,7 +180,7 @@ impl RawEnvelope {
 }
 
 /// Checks that no element can reach the end of its range before its limit. An element that falls when it is pressed has its
-/// end at 0, unless its readings have a sign.
+/// end at the array's least count; where that is not said, and the element rests at 0 or below, its readings have a sign.
 fn check_headroom(
     array: &Array,
     rest: Rest<'_>,
@@ -188,15 +188,21 @@ fn check_headroom(
     unwatched: &[usize],
 ) -> Result<(), WrongField> {
     let full_scale_counts = array.full_scale_counts();
+    let least_counts = |baseline_counts: f64| {
+        let is_signed = array.least_counts() == 0.0 && baseline_counts <= 0.0;
+        if is_signed { -full_scale_counts } else { array.least_counts() }
+    };
+    // Of the range up to the greatest count, or down to the least.
+    let most = |least_counts: f64| least_counts + FULL_SCALE_SHARE_MAX * (full_scale_counts - least_counts);
+    let fewest =
+        |least_counts: f64| full_scale_counts - FULL_SCALE_SHARE_MAX * (full_scale_counts - least_counts);
     let pairs = rest.baseline_counts.iter().zip(rest.sensitivity_counts_per_mm).enumerate();
     for (element, (baseline_counts, sensitivity)) in pairs.filter(|(element, _)| !unwatched.contains(element))
     {
         let room_counts = if *sensitivity >= 0.0 {
-            FULL_SCALE_SHARE_MAX * full_scale_counts - baseline_counts
-        } else if *baseline_counts > 0.0 {
-            baseline_counts - (1.0 - FULL_SCALE_SHARE_MAX) * full_scale_counts
+            most(array.least_counts()) - baseline_counts
         } else {
-            baseline_counts + FULL_SCALE_SHARE_MAX * full_scale_counts
+            baseline_counts - fewest(least_counts(*baseline_counts))
         };
         if reach_counts > room_counts {
             let problem = format!(

@@ -104,8 +104,10 @@ impl RawSimulation {
         }
         for &RawStuck { element, counts } in &self.stuck {
             let list = "simulation.stuck";
-            if f64::from(counts) > array.full_scale_counts() {
-                let problem = format!("counts are 0 to {}, not {counts}", array.full_scale_counts());
+            let range_counts = array.least_counts()..=array.full_scale_counts();
+            if !range_counts.contains(&f64::from(counts)) {
+                let (least, most) = (range_counts.start(), range_counts.end());
+                let problem = format!("counts are {least} to {most}, not {counts}");
                 return Err(wrong(list, problem));
             }
             add(list, element, ElementFault::Stuck { counts })?;

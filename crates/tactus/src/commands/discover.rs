@@ -296,13 +296,15 @@ fn of_array(model: Model, path: Option<&Path>, measured: &Array) -> anyhow::Resu
 
 fn described(array: &Array) -> String {
     format!(
-        "{:?} ({} rows of {}, {} mm apart, {} Hz, {} counts at most)",
+        "{:?} ({} rows of {}, {} mm apart, {} Hz, {} to {} counts in steps of {})",
         array.name(),
         array.rows(),
         array.cols(),
         array.pitch_mm(),
         array.rate_hz(),
-        array.full_scale_counts()
+        array.least_counts(),
+        array.full_scale_counts(),
+        array.step_counts()
     )
 }
 

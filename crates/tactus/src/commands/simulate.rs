@@ -114,12 +114,16 @@ fn print(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by: &
         let note = format!("deeper than the covering: what is below it presses as if {thickness_mm} mm deep");
         fields.push(("note", note));
     }
-    let full_scale_counts = array.full_scale_counts();
-    let beyond = copies.iter().flatten().filter(|counts| **counts > full_scale_counts).count();
+    let range_counts = array.least_counts()..=array.full_scale_counts();
+    let beyond = copies.iter().flatten().filter(|counts| !range_counts.contains(counts)).count();
     if beyond > 0 {
         fields.push((
             "note",
-            format!("{beyond} values exceed the converter's {full_scale_counts}; --noise reads them"),
+            format!(
+                "{beyond} values are beyond the converter's {} to {}; --noise reads them",
+                range_counts.start(),
+                range_counts.end()
+            ),
         ));
     }
     if let Some(out) = &args.out {

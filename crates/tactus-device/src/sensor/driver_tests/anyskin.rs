@@ -18,6 +18,7 @@ fn start() -> (SensorDriver, MemoryPort) {
         rows: 5,
         cols: 3,
         rate_hz: 100.0,
+        least_counts: 0.0,
         full_scale_counts: 5000.0,
         simulated: false,
     };

@@ -71,6 +71,7 @@ fn lab(toml: &str) -> TestBench {
         rows: 1,
         cols: 2,
         rate_hz: 30.0,
+        least_counts: 0.0,
         full_scale_counts: 4095.0,
         simulated: false,
     };

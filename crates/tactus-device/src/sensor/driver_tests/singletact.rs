@@ -16,6 +16,7 @@ fn start(addresses: &[u8]) -> (SensorDriver, MemoryPort) {
         rows: 1,
         cols: addresses.len(),
         rate_hz: 50.0,
+        least_counts: 0.0,
         full_scale_counts: 1023.0,
         simulated: false,
     };

@@ -19,6 +19,7 @@ use std::f64::consts::E;
 use std::ops::Range;
 
 use super::{ALIKE_Z, Noise, PAIRS_LEAST, bias_variance, pooled, repeated_frames};
+use crate::data::converter::{OFF_MAX, ROUNDED_MAX};
 use crate::data::frames::Frames;
 use crate::data::motion::CLEAR_MM;
 use crate::numbers::median;
@@ -174,14 +175,23 @@ fn before_rounding(d: f64, step_counts: f64) -> f64 {
 
 /// True if nearly all readings of an element are whole steps apart. Means of several readings are not.
 fn is_in_steps(frames: &Frames, step_counts: f64) -> bool {
-    let first = &frames.counts[..frames.elements.min(frames.counts.len())];
-    let is_whole = |(counts, first): &(&f32, &f32)| {
-        let steps = f64::from(**counts - **first) / step_counts;
-        // Readings that are no binary fractions are rounded.
-        let rounding = f64::from(counts.abs().max(first.abs()) * f32::EPSILON) / step_counts;
-        (steps - steps.round()).abs() < 0.02 + rounding
+    let elements = frames.elements;
+    let whole_of = |element: usize| {
+        let mut readings: Vec<f64> =
+            frames.counts.iter().skip(element).step_by(elements).map(|counts| f64::from(*counts)).collect();
+        let middle = readings.len() / 2;
+        // One that is surely not at an end of the range.
+        let (_, &mut among, _) = readings.select_nth_unstable_by(middle, f64::total_cmp);
+        let is_whole = |reading: &&f64| {
+            let steps = (**reading - among) / step_counts;
+            // Readings that are no whole numbers are rounded.
+            let rounding = if reading.fract() == 0.0 { 0.0 } else { reading.abs() * f64::from(f32::EPSILON) };
+            rounding < ROUNDED_MAX * step_counts
+                && (steps - steps.round()).abs() * step_counts < OFF_MAX * step_counts + rounding
+        };
+        readings.iter().filter(is_whole).count()
     };
-    let whole = frames.counts.iter().zip(first.iter().cycle()).filter(is_whole).count();
+    let whole: usize = if frames.is_empty() { 0 } else { (0..elements).map(whole_of).sum() };
     step_counts > 0.0 && whole as f64 > 0.99 * frames.counts.len() as f64
 }
 

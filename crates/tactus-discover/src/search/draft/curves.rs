@@ -96,22 +96,28 @@ impl Curve {
 
 /// Covariance of linear combinations of columns with these products.
 fn covariance(gram: &DMatrix<f64>, columns: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    let Some(inverse) = inverse(&(columns.transpose() * gram * columns)) else { return Vec::new() };
+    let Some(inverse) = inverse(gram, columns) else { return Vec::new() };
     inverse.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
-/// The inverse of products of columns, with the ridge that each column has in the unit in which its square is 1: a column may have any unit.
-fn inverse(products: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// The inverse of the products of linear combinations, with a ridge for each in a unit of its own: a combination may have any unit. `None` if
+/// the data show none of them.
+fn inverse(gram: &DMatrix<f64>, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let products = columns.transpose() * gram * columns;
     let size = products.nrows();
-    let most = (0..size).map(|i| products[(i, i)]).fold(0.0, f64::max);
-    // What nothing shows has the unit of the others.
-    let unit = |i: usize| {
-        let own = products[(i, i)];
-        if own > 0.0 { own.sqrt() } else { most.sqrt() }
+    // The square of one whose parts cancel nowhere: what is less than rounding leaves of that is not shown.
+    let whole = |i: usize| -> f64 {
+        columns.column(i).iter().enumerate().map(|(knot, value)| gram[(knot, knot)] * value * value).sum()
     };
-    let units = DVector::from_fn(size, |i, _| unit(i).recip());
+    let square = |i: usize| {
+        let (own, whole) = (products[(i, i)], whole(i));
+        if own > RIDGE * whole { own } else { whole }
+    };
+    let most = (0..size).map(square).fold(0.0, f64::max);
+    let unit = |i: usize| if square(i) > 0.0 { square(i) } else { most }.sqrt().recip();
+    let units = DVector::from_fn(size, |i, _| unit(i));
     let scaled = DMatrix::from_fn(size, size, |i, j| products[(i, j)] * units[i] * units[j]);
-    let inverse = (scaled + DMatrix::identity(size, size) * RIDGE).try_inverse()?;
+    let inverse = (scaled + DMatrix::identity(size, size) * RIDGE).try_inverse().filter(|_| most > 0.0)?;
     Some(DMatrix::from_fn(size, size, |i, j| inverse[(i, j)] * units[i] * units[j]))
 }
 
@@ -202,7 +208,7 @@ fn fitted(places: &[f64], curve: &Curve, kind: Kind, shape: f64) -> Option<Price
     let both = DMatrix::from_columns(&[column.clone(), constant]);
     let products = both.transpose() * &curve.gram * &both;
     let wanted = both.transpose() * &curve.gram * &curve.values;
-    let solved = inverse(&products)? * wanted;
+    let solved = inverse(&curve.gram, &both)? * wanted;
     let with = curve.cost(&(&both * &solved));
     let without = curve.cost(&(&column * solved[0]));
     if let Law::Linear { .. } = unit {

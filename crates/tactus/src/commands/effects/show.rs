@@ -166,7 +166,10 @@ pub(super) fn of_library(known: &Definition) -> Value {
         "status": "library",
         "stage": stage_name(known.stage()),
         "summary": known.summary,
-        "parameters": known.parameters.iter().map(|one| json!({ "name": one.name, "range": one.range })).collect::<Vec<_>>(),
+        "parameters": known.parameters.iter().map(|one| {
+            let range = (!one.is_counts()).then_some(one.range);
+            json!({ "name": one.name, "range": range })
+        }).collect::<Vec<_>>(),
         "acts_by": acts_by(known),
         "near_twins": known.near_twins,
         "shown_by": known.shown_by,

@@ -212,7 +212,8 @@ impl SimulatedSensor {
     fn frame(&mut self, pipeline: &mut Pipeline, seq: u64, t_s: f64, lost_before: u32) -> Frame {
         let path = &self.path;
         let clean_counts = pipeline.step(Moment::at(t_s), &|t_s: f64| path.at(t_s)).to_vec();
-        let full_scale_counts = self.scene.array().full_scale_counts();
+        let array = self.scene.array();
+        let (least_counts, full_scale_counts) = (array.least_counts(), array.full_scale_counts());
         let mut flags = if seq == 0 { FrameFlags::NEW_EPOCH } else { FrameFlags::default() };
         if lost_before > 0 {
             flags = flags.with(FrameFlags::GAP_BEFORE);
@@ -221,7 +222,7 @@ impl SimulatedSensor {
         for clean in clean_counts {
             let deviate: f64 = StandardNormal.sample(&mut self.rng);
             let read = pipeline.read(clean, self.scene.simulator.noise_rms_counts * deviate);
-            if read <= 0.0 || read >= full_scale_counts {
+            if read <= least_counts || read >= full_scale_counts {
                 flags = flags.with(FrameFlags::SATURATED);
             }
             #[expect(clippy::cast_possible_truncation, reason = "frames carry single precision")]
