@@ -37,7 +37,8 @@
 //! | converter.rs | `READINGS_LEAST` | `20` | convention | fewer may lie on a lattice by chance |
 //! | converter.rs | `WIDER` | `1.4` | convention | between the declared step and twice that |
 //! | converter.rs | `OFF_MAX` | `0.02` | convention | counts are stored in single precision |
-//! | converter.rs | `ROUNDED_MAX` | `0.08` | convention | with `OFF_MAX` a tenth of a step; up to 20 bits that are no whole counts |
+//! | converter.rs | `ROUNDED_MAX` | `0.08` | convention | with `OFF_MAX` a tenth of a step; up to 19 bits that are no whole counts |
+//! | converter.rs | `WHOLE_MAX` | `16_777_216.0` | derived | `2^24`: single precision has as many bits |
 //! | converter.rs | `GAPS_MAX` | `512` | cost | a loop for each |
 //! | converter.rs | `AT_END_LEAST` | `10` | convention | fewer do not tell an end of a gap |
 //! | converter.rs | `CHANCE` | `1e-6` | convention | far below any level in use, times what was looked at |

@@ -209,6 +209,12 @@ impl Array {
         self.least_counts
     }
 
+    /// True if both are the same, but for a least reading that one of them does not say.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let is_unsaid = self.least_counts == 0.0 || other.least_counts == 0.0;
+        self == other || is_unsaid && Self { least_counts: other.least_counts, ..self.clone() } == *other
+    }
+
     /// Largest reading.
     pub fn full_scale_counts(&self) -> f64 {
         self.full_scale_counts

@@ -48,3 +48,12 @@ fn the_shipped_arrays_have_the_papers_resolutions() {
         );
     }
 }
+
+#[test]
+fn arrays_are_alike_if_one_does_not_say_its_least_reading() {
+    let with = |least| Array::digitacts().with_least_counts(least).unwrap();
+    assert!(with(-4095.0).is_like(&Array::digitacts()) && Array::digitacts().is_like(&with(-4095.0)));
+    assert!(with(-4095.0).is_like(&with(-4095.0)));
+    assert!(!with(-4095.0).is_like(&with(-100.0)));
+    assert!(!Array::fingertip().is_like(&with(-4095.0)));
+}

@@ -52,25 +52,33 @@ fn an_element_that_could_saturate_before_its_limit_is_refused() {
     Rig::from_toml(&limit(3290)).unwrap();
     let error = Rig::from_toml(&limit(3291)).unwrap_err().to_string();
     assert!(
-        error.starts_with("envelope.element_max_counts") && error.contains("95 % of full scale"),
+        error.starts_with("envelope.element_max_counts")
+            && error.contains("5 % of full scale before the end"),
         "{error}"
     );
 }
 
-/// From 4095 down to -1000 counts, 95 % of the range end at -745; the elements rest at 100 and fall.
+/// 5 % of 4095 counts above -1000 are -795; the elements rest at 100 and fall. Where readings have a sign that is not said, they end at -4095.
 #[test]
 fn an_element_that_falls_has_its_end_at_the_least_count() {
     let falls = SIM
         .replace("full_scale_counts = 4095", "least_counts = -1000\nfull_scale_counts = 4095")
         .replace("sensitivity_counts_per_mm = 1000.0", "sensitivity_counts_per_mm = -1000.0");
-    assert_ne!(falls.matches("-1000").count(), 1, "both are replaced");
-    let limit = |counts: u32| {
-        falls.replace("element_max_counts = 2000.0", &format!("element_max_counts = {counts}.0"))
+    assert_eq!(falls.matches("-1000").count(), 2, "both are replaced");
+    let limited = |text: &str, counts: u32| {
+        Rig::from_toml(
+            &text.replace("element_max_counts = 2000.0", &format!("element_max_counts = {counts}.0")),
+        )
     };
-    let rig = Rig::from_toml(&limit(345)).unwrap();
+    let rig = limited(&falls, 395).unwrap();
     assert_eq!(Rig::from_json(&rig.to_json()).unwrap().array, rig.array);
-    let error = Rig::from_toml(&limit(346)).unwrap_err().to_string();
-    assert!(error.starts_with("envelope.element_max_counts") && error.contains("only 845"), "{error}");
+    let error = limited(&falls, 396).unwrap_err().to_string();
+    assert!(error.starts_with("envelope.element_max_counts") && error.contains("only 895"), "{error}");
+    let signed = SIM
+        .replace("baseline_counts = 100.0", "baseline_counts = 0.0")
+        .replace("sensitivity_counts_per_mm = 1000.0", "sensitivity_counts_per_mm = -1000.0");
+    limited(&signed, 3390).unwrap();
+    limited(&signed, 3391).unwrap_err();
     let error = refused("full_scale_counts = 4095", "least_counts = 5000\nfull_scale_counts = 4095");
     assert!(error.contains("least_counts") && error.contains("below full_scale_counts"), "{error}");
 }

@@ -112,8 +112,10 @@ impl ArrayExpectation {
     }
 
     /// True if an element reads so at an end of its range. Many sensors rest at 0, so that it is no end.
-    fn is_at_an_end(&self, counts: f64) -> bool {
-        counts.abs() >= self.full_scale_counts || counts <= self.least_counts && self.least_counts != 0.0
+    fn is_at_an_end(&self, counts: f32) -> bool {
+        #[expect(clippy::cast_possible_truncation, reason = "as readings are stored")]
+        let [least, most] = [self.least_counts, self.full_scale_counts].map(|end| end as f32);
+        if least == 0.0 { counts.abs() >= most } else { counts >= most || counts <= least }
     }
 
     /// What the service says of the array, read over a link of this protocol and transport. `tick_ns`: tick of the device's clock, 0 if
@@ -302,7 +304,7 @@ impl Driver {
         }
         let counts: Arc<[f32]> =
             if reading.bad.is_empty() { reading.counts } else { self.held.as_slice().into() };
-        if counts.iter().any(|count| self.expect.is_at_an_end(f64::from(*count))) {
+        if counts.iter().any(|count| self.expect.is_at_an_end(*count)) {
             flags = flags.with(FrameFlags::SATURATED);
         }
         if !reading.bad.is_empty() {

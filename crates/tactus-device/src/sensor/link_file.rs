@@ -86,6 +86,14 @@ fn contradiction(format: &Format, samples: &RawSamples, rig: &Rig, transport: &T
         ));
     }
     let full_scale_counts = array.full_scale_counts();
+    if let Some((least, _)) = samples.kind.range()
+        && array.least_counts() < least
+    {
+        return Some(format!(
+            "samples.type is at least {least}, but array.least_counts is {}",
+            array.least_counts()
+        ));
+    }
     if let Some((_, greatest)) = samples.kind.range()
         && full_scale_counts > greatest
     {

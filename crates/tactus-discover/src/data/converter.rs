@@ -2,7 +2,8 @@
 //!
 //! Means do not show this, nor do residuals if noise dithers; single readings do.
 //!
-//! - **Wider steps.** The probability that `n` different readings lie on a lattice of `q` declared steps by chance is `(1 / q)^(n - 2)`.
+//! - **Wider steps.** The probability that `n` different readings lie on a lattice of `q` declared steps by chance is `(1 / q)^(n - 4)`: the ends of the
+//!   range need not lie on it, one is its origin and one says its step.
 //! - **Gaps.** An element whose readings go from one side of a gap of `w` counts to the other by `d` counts from frame to frame would
 //!   have been read inside with a probability of `w / d`, had the converter those codes. What belongs there is read as a code at one of its
 //!   ends, which then is more frequent than its neighbours; without that it is a jump of the signal, and no gap of codes.
@@ -26,6 +27,8 @@ const WIDER: f64 = 1.4;
 pub(super) const OFF_MAX: f64 = 0.02;
 /// Readings are rounded by at most so much of a step; a step that is nearly lost in that is not seen.
 pub(super) const ROUNDED_MAX: f64 = 0.08;
+/// Up to here single precision has all whole numbers.
+const WHOLE_MAX: f64 = 16_777_216.0;
 /// Gaps that are looked at, at most; with more, readings are too few to show codes.
 const GAPS_MAX: usize = 512;
 /// A code at the end of a gap has at least so many readings.
@@ -118,7 +121,7 @@ impl Frequencies {
         // The ends of the range need not be a whole number of steps apart from the others.
         let step = lattice_step(&readings[1..readings.len() - 1])?;
         (step >= WIDER * declared_counts.max(f64::MIN_POSITIVE)).then(|| {
-            let chance = (declared_counts / step).max(1e-3).powf(readings.len() as f64 - 2.0);
+            let chance = (declared_counts / step).max(1e-3).powf(readings.len() as f64 - 4.0);
             Converter { fault: Fault::WiderSteps(step), p_value: chance.max(f64::MIN_POSITIVE) }
         })
     }
@@ -170,13 +173,18 @@ impl Frequencies {
     }
 }
 
+/// True if single precision has a reading as it was.
+pub(super) fn is_exact(reading: f64) -> bool {
+    reading.fract() == 0.0 && reading.abs() <= WHOLE_MAX
+}
+
 /// The step of a lattice on which all of these rising readings lie, if they lie on one.
 ///
 /// In a unit in which a step is no binary fraction each reading is rounded, so that a difference of two says the step only nearly. The smallest
 /// differences are surely one step each or a few; what they say together tells how many steps a greater one has, and so on.
 fn lattice_step(readings: &[f64]) -> Option<f64> {
     let (first, last) = (*readings.first()?, *readings.last()?);
-    let are_exact = readings.iter().all(|reading| reading.fract() == 0.0);
+    let are_exact = readings.iter().all(|reading| is_exact(*reading));
     let rounding = if are_exact { 0.0 } else { last.abs().max(first.abs()) * f64::from(f32::EPSILON) };
     let mut apart: Vec<f64> = readings.windows(2).map(|pair| pair[1] - pair[0]).collect();
     apart.sort_by(f64::total_cmp);

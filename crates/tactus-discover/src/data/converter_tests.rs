@@ -83,6 +83,10 @@ fn the_steps_of_single_precision_are_no_converters() {
     #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
     let frames = readings((0..1000).map(|k| (2.2 + 2.5 / f64::from(1 << 24) * f64::from(3 * k)) as f32));
     assert!(step_of(&frames, 2.5 / f64::from(1 << 24)).is_none());
+    // Nor are whole numbers beyond its 24 bits, which are 8 apart there.
+    #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
+    let frames = readings((0..9000).map(|k| (f64::from(1 << 26) + f64::from(k)) as f32));
+    assert!(step_of(&frames, 1.0).is_none());
 }
 
 #[test]

@@ -23,7 +23,7 @@ pub(crate) struct RawArray {
     row_centres_mm: Vec<f64>,
     /// Frames per second of the device.
     rate_hz: f64,
-    /// Least reading, below 0 where readings have a sign.
+    /// Least reading, below 0 where readings have a sign; 0 without this key.
     #[serde(default, skip_serializing_if = "is_zero")]
     least_counts: f64,
     /// Greatest reading.

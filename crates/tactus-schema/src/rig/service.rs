@@ -188,26 +188,24 @@ fn check_headroom(
     unwatched: &[usize],
 ) -> Result<(), WrongField> {
     let full_scale_counts = array.full_scale_counts();
+    // As far from either end.
+    let margin_counts = (1.0 - FULL_SCALE_SHARE_MAX) * full_scale_counts;
     let least_counts = |baseline_counts: f64| {
         let is_signed = array.least_counts() == 0.0 && baseline_counts <= 0.0;
         if is_signed { -full_scale_counts } else { array.least_counts() }
     };
-    // Of the range up to the greatest count, or down to the least.
-    let most = |least_counts: f64| least_counts + FULL_SCALE_SHARE_MAX * (full_scale_counts - least_counts);
-    let fewest =
-        |least_counts: f64| full_scale_counts - FULL_SCALE_SHARE_MAX * (full_scale_counts - least_counts);
     let pairs = rest.baseline_counts.iter().zip(rest.sensitivity_counts_per_mm).enumerate();
     for (element, (baseline_counts, sensitivity)) in pairs.filter(|(element, _)| !unwatched.contains(element))
     {
         let room_counts = if *sensitivity >= 0.0 {
-            most(array.least_counts()) - baseline_counts
+            full_scale_counts - margin_counts - baseline_counts
         } else {
-            baseline_counts - fewest(least_counts(*baseline_counts))
+            baseline_counts - (least_counts(*baseline_counts) + margin_counts)
         };
         if reach_counts > room_counts {
             let problem = format!(
                 "with baseline_band_counts {reach_counts} counts, but element {element} has only {room_counts:.0} between its \
-                 baseline and 95 % of full scale: a load could saturate it unseen"
+                 baseline and 5 % of full scale before the end of its range: a load could saturate it unseen"
             );
             return Err(wrong("envelope.element_max_counts", problem));
         }

@@ -283,7 +283,7 @@ pub(crate) fn declared(path: &Path) -> anyhow::Result<Model> {
 /// If it is of another array than the data.
 fn of_array(model: Model, path: Option<&Path>, measured: &Array) -> anyhow::Result<Model> {
     let declared = &model.base.array;
-    if declared != measured {
+    if !declared.is_like(measured) {
         let path = path.unwrap_or(Path::new("the model")).display();
         bail!(
             "{path} is a model of another array than the data: the model has {}, the data have {}",

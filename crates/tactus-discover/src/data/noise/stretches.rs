@@ -19,7 +19,7 @@ use std::f64::consts::E;
 use std::ops::Range;
 
 use super::{ALIKE_Z, Noise, PAIRS_LEAST, bias_variance, pooled, repeated_frames};
-use crate::data::converter::{OFF_MAX, ROUNDED_MAX};
+use crate::data::converter::{OFF_MAX, ROUNDED_MAX, is_exact};
 use crate::data::frames::Frames;
 use crate::data::motion::CLEAR_MM;
 use crate::numbers::median;
@@ -184,8 +184,7 @@ fn is_in_steps(frames: &Frames, step_counts: f64) -> bool {
         let (_, &mut among, _) = readings.select_nth_unstable_by(middle, f64::total_cmp);
         let is_whole = |reading: &&f64| {
             let steps = (**reading - among) / step_counts;
-            // Readings that are no whole numbers are rounded.
-            let rounding = if reading.fract() == 0.0 { 0.0 } else { reading.abs() * f64::from(f32::EPSILON) };
+            let rounding = if is_exact(**reading) { 0.0 } else { reading.abs() * f64::from(f32::EPSILON) };
             rounding < ROUNDED_MAX * step_counts
                 && (steps - steps.round()).abs() * step_counts < OFF_MAX * step_counts + rounding
         };
