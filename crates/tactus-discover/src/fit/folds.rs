@@ -49,7 +49,7 @@ impl FoldsOf {
     }
 }
 
-/// What is known of a parameter before a fold is fitted: a normal density, on the parameter's [`Scale`].
+/// What is known of a parameter before a fold is fitted: a normal density, on the parameter's [scale](super::scale::Scale).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Prior {
     /// Where it is centred, counted from the parameter's value.
