@@ -24,7 +24,7 @@ const READINGS_LEAST: usize = 20;
 /// Least ratio of the lattice's step to the declared one.
 const WIDER: f64 = 1.4;
 /// Greatest distance of a reading from the lattice, as a share of a step.
-pub(super) const OFF_MAX: f64 = 0.02;
+const OFF_MAX: f64 = 0.02;
 /// Readings are rounded by at most so much of a step; a step that is nearly lost in that is not seen.
 pub(super) const ROUNDED_MAX: f64 = 0.08;
 /// Up to here single precision has all whole numbers.
@@ -173,6 +173,12 @@ impl Frequencies {
     }
 }
 
+/// True if readings that are rounded by so much may be a whole number of steps apart.
+pub(super) fn is_whole(apart_counts: f64, step_counts: f64, rounding_counts: f64) -> bool {
+    let steps = apart_counts / step_counts;
+    (steps - steps.round()).abs() * step_counts <= OFF_MAX * step_counts + rounding_counts
+}
+
 /// True if single precision has a reading as it was.
 pub(super) fn is_exact(reading: f64) -> bool {
     reading.fract() == 0.0 && reading.abs() <= WHOLE_MAX
@@ -198,10 +204,7 @@ fn lattice_step(readings: &[f64]) -> Option<f64> {
         steps += (one / step).round();
     }
     let step = sum / steps;
-    let is_on = |reading: &f64| {
-        let steps = (reading - first) / step;
-        (steps - steps.round()).abs() * step <= OFF_MAX * step + rounding
-    };
+    let is_on = |reading: &f64| is_whole(reading - first, step, rounding);
     (steps > 0.0 && readings.iter().all(is_on)).then_some(step)
 }
 

@@ -19,7 +19,7 @@ use std::f64::consts::E;
 use std::ops::Range;
 
 use super::{ALIKE_Z, Noise, PAIRS_LEAST, bias_variance, pooled, repeated_frames};
-use crate::data::converter::{OFF_MAX, ROUNDED_MAX, is_exact};
+use crate::data::converter::{ROUNDED_MAX, is_exact, is_whole};
 use crate::data::frames::Frames;
 use crate::data::motion::CLEAR_MM;
 use crate::numbers::median;
@@ -182,13 +182,11 @@ fn is_in_steps(frames: &Frames, step_counts: f64) -> bool {
         let middle = readings.len() / 2;
         // One that is surely not at an end of the range.
         let (_, &mut among, _) = readings.select_nth_unstable_by(middle, f64::total_cmp);
-        let is_whole = |reading: &&f64| {
-            let steps = (**reading - among) / step_counts;
+        let is_in_step = |reading: &&f64| {
             let rounding = if is_exact(**reading) { 0.0 } else { reading.abs() * f64::from(f32::EPSILON) };
-            rounding < ROUNDED_MAX * step_counts
-                && (steps - steps.round()).abs() * step_counts < OFF_MAX * step_counts + rounding
+            rounding < ROUNDED_MAX * step_counts && is_whole(**reading - among, step_counts, rounding)
         };
-        readings.iter().filter(is_whole).count()
+        readings.iter().filter(is_in_step).count()
     };
     let whole: usize = if frames.is_empty() { 0 } else { (0..elements).map(whole_of).sum() };
     step_counts > 0.0 && whole as f64 > 0.99 * frames.counts.len() as f64

@@ -124,16 +124,21 @@ fn ends(values: &[f64]) -> [f64; 2] {
 
 /// A number with this many decimals; with more where it would have less than two digits.
 fn number(value: f64, places: usize) -> String {
-    let digits = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    let digits = decade(value);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 12")]
     let least = (1.0 - digits).clamp(0.0, 12.0) as usize;
     format!("{value:.0$}", places.max(least))
 }
 
+/// The power of ten in which a number begins.
+fn decade(value: f64) -> f64 {
+    if value == 0.0 { 0.0 } else { value.abs().log10().floor() }
+}
+
 /// Both ends of a range with the same decimals: the larger one has three digits.
 fn numbers(range: [f64; 2]) -> [String; 2] {
     let larger = range[0].abs().max(range[1].abs());
-    let digits = if larger > 0.0 { larger.log10().floor() } else { 0.0 };
+    let digits = decade(larger);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 9")]
     let places = (2.0 - digits).clamp(0.0, 9.0) as usize;
     range.map(|end| {
