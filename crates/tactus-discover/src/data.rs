@@ -71,6 +71,7 @@
 //! | noise.rs | `DIFFERENCES_SHARE` | `2.0 / 3.0` | derived | von Neumann et al., in the comment |
 //! | noise.rs | `QUIETEST` | `0.7` | convention | below it, rounding looks the same |
 //! | noise.rs | `MEDIAN_SIZE` | `0.674_490` | derived | median of `abs` of a normal deviate |
+//! | noise.rs | `DITHERED_STEPS` | `0.5` | derived | `e^-10` of the bias is left ([`noise`]) |
 //! | noise.rs | `ALL_ROUNDING` | `0.9` | convention | 0.9 of the noise |
 //! | noise/repeats.rs | `PLACE_MM` | `0.02` | convention | places that differ by less are one |
 //! | noise/repeats.rs | `DEPTH_MM` | `0.005` | convention | the same, of depths |
@@ -85,6 +86,7 @@
 //! | noise/stretches.rs | `FRAMES_EACH` | `10.0` | convention | of the greatest autocorrelation that short dwells show |
 //! | noise/stretches.rs | `HALVINGS` | `20` | derived | a millionth of the interval |
 //! | noise/stretches.rs | `GROUPS` | `20` | convention | of a jackknife |
+//! | pace.rs | `APART` | `0.75` | derived | of full frames and a half one |
 //! | spectrum.rs | `STANDS_OUT` | `8.0` | tried | 6 at first; no recipe |
 //! | spectrum.rs | `RECORDINGS_PER_FALSE_LINE` | `50.0` | convention | one recording of noise in fifty (decision 0055) |
 //! | spectrum.rs | `PHASES_PER_COLUMN` | `2` | derived | so that no phase is more than a quarter of a turn, over all columns, from one looked at |
@@ -108,6 +110,7 @@ mod history;
 mod known;
 mod motion;
 mod noise;
+mod pace;
 pub(crate) mod spectrum;
 mod way;
 

@@ -94,7 +94,7 @@ mod totals;
 pub(crate) use folds::{ByFolds, CLIP, FOLDS, FoldsOf, gains_by_folds};
 pub(crate) use grams::Grams;
 pub(crate) use heldout::LOUD;
-pub(crate) use knots::{hat, of_formulas, places, table_places};
+pub(crate) use knots::{Hat, of_formulas, places, table_places};
 pub(crate) use parameters::{Parameters, Term};
 pub(crate) use predictor::Predictor;
 pub(crate) use prepare::Prepared;

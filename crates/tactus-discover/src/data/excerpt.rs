@@ -2,7 +2,8 @@
 //!
 //! Up to [`READINGS_MOST`] readings all are read. Of a longer recording one part of two is, then one of four, and so on. A part is a press with
 //! the rest that follows it, up to the next press; one with more than one in [`PART_SHARE`] of the frames that may be read counts as several.
-//! Which one of a group is read is drawn, because presses often come in an order that repeats.
+//! Which one of a group is read is drawn, because presses often come in an order that repeats. Before that, frames of a fast sensor are joined
+//! ([`super::pace`]).
 //!
 //! Of the other parts the tip's way is kept ([`super::way`]), because a covering remembers presses.
 //!
@@ -24,7 +25,11 @@ const STREAM: u64 = 0x0065_7863_6572_7074;
 /// How much of the frames that are given is read.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Excerpt {
-    frames_most: usize,
+    pub(super) frames_most: usize,
+    /// So many frames that are given are joined to one.
+    pub(super) each: u32,
+    /// Whether a line stands out of the spectrum, once that is known.
+    pub(super) is_without_tones: Option<bool>,
     /// Of `2^halvings` parts one is read.
     halvings: u32,
     /// Run and press of the last frame that was given; -1 before the run's first press.
@@ -32,10 +37,10 @@ pub(super) struct Excerpt {
     press: i32,
     /// Number of parts so far, how many frames the last one has, and whether it is read.
     parts: u64,
-    length: usize,
+    length: u64,
     reads: bool,
     /// The number and the first frame of each part that is read.
-    read: Vec<(u64, usize)>,
+    pub(super) read: Vec<(u64, usize)>,
 }
 
 impl Default for Excerpt {
@@ -54,6 +59,8 @@ impl Excerpt {
     pub(super) const fn of_frames(frames_most: usize) -> Self {
         Self {
             frames_most,
+            each: 1,
+            is_without_tones: None,
             halvings: 0,
             run: String::new(),
             press: -1,
@@ -88,7 +95,8 @@ impl Frames {
             self.excerpt.press = -1;
         }
         let is_other_press = press >= 0 && press != self.excerpt.press;
-        let is_full = self.excerpt.length >= self.excerpt.frames_most.div_ceil(PART_SHARE);
+        let most = self.excerpt.frames_most.div_ceil(PART_SHARE) as u64 * u64::from(self.excerpt.each);
+        let is_full = self.excerpt.length >= most;
         if is_other_run || is_other_press || is_full {
             self.next_part(is_other_run);
         }
@@ -122,9 +130,12 @@ impl Frames {
         self.way.push(WayPoint { before: self.len(), t_s, position_mm, press });
     }
 
-    /// Reads fewer parts, if there are too many frames.
+    /// Joins frames or reads fewer parts, if there are too many frames.
     pub(super) fn fit_in(&mut self) {
         while self.len() > self.excerpt.frames_most {
+            if self.slow_down() {
+                continue;
+            }
             self.excerpt.halvings += 1;
             let mut kept = vec![false; self.len()];
             let read = std::mem::take(&mut self.excerpt.read);
@@ -183,6 +194,7 @@ impl Frames {
         retain(&mut self.covering_mm, kept, 1);
         retain(&mut self.indenter, kept, 1);
         retain(&mut self.temperature_c, kept, 1);
+        retain(&mut self.joined, kept, 1);
         retain(&mut self.counts, kept, self.elements);
     }
 

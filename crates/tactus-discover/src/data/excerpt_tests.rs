@@ -63,7 +63,7 @@ fn of_a_long_recording_whole_presses_from_all_of_it_are_read() {
     let groups: Vec<i32> = read.iter().map(|press| press / group).collect();
     assert_eq!(groups, (0..i32::try_from(groups.len()).unwrap()).collect::<Vec<_>>());
     assert!(1000 - groups.last().unwrap() * group <= 2 * group);
-    assert!(frames.numbers().windows(2).all(|two| two[0] < two[1]));
+    assert!(frames.numbers().is_sorted_by(|one, next| one < next));
     assert_eq!(frames.runs, [("a".to_owned(), frames.len())]);
 }
 
@@ -110,7 +110,7 @@ fn a_frame_that_is_read_is_as_it_was_given() {
     push(&mut all, "a", 300, 10);
     push(&mut some, "a", 300, 10);
     for (row, number) in some.rows().zip(some.numbers()) {
-        let same = all.rows().nth(usize::try_from(*number).unwrap()).unwrap();
+        let same = all.rows().nth(usize::try_from(number).unwrap()).unwrap();
         assert_eq!((row.press, row.t_ns, row.position_mm), (same.press, same.t_ns, same.position_mm));
     }
 }
@@ -142,12 +142,9 @@ fn a_covering_remembers_presses_that_are_not_read() {
         assert!(part.left_out() > 900);
         let effects = [effect];
         let of_all = predicted(&all, &effects);
-        let number = |number: &u64| usize::try_from(*number).unwrap() * ELEMENTS;
-        let wanted: Vec<f32> = part
-            .numbers()
-            .iter()
-            .flat_map(|one| of_all[number(one)..number(one) + ELEMENTS].to_vec())
-            .collect();
+        let number = |number: u64| usize::try_from(number).unwrap() * ELEMENTS;
+        let wanted: Vec<f32> =
+            part.numbers().flat_map(|one| of_all[number(one)..number(one) + ELEMENTS].to_vec()).collect();
         let off = rms(&predicted(&part, &effects), &wanted);
         part.way.clear();
         let off_without = rms(&predicted(&part, &effects), &wanted);

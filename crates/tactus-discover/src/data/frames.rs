@@ -8,8 +8,8 @@ use super::excerpt::Excerpt;
 use super::motion::load_speed_mm_per_s;
 use super::way::WayPoint;
 
-/// Frames of one or more runs, stored by column. Of a long recording only whole presses from all of it, so that memory and time are bounded:
-/// [`Frames::left_out`] says how many frames are not there.
+/// Frames of one or more runs, stored by column. Memory and time are bounded: of a long recording of a fast sensor each frame is the mean of some
+/// ([`Frames::joined`]), and of a longer one only whole presses from all of it are there ([`Frames::left_out`]).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frames {
     pub(crate) elements: usize,
@@ -31,8 +31,10 @@ pub struct Frames {
     pub(crate) counts: Vec<f32>,
     /// The tip's way where frames are left out.
     pub(super) way: Vec<WayPoint>,
-    /// The place of each frame among those that were given.
+    /// The place of each frame among those that were given; of some that were joined, that of their first.
     pub(super) number: Vec<u64>,
+    /// How many frames that were given each is the mean of.
+    pub(super) joined: Vec<u32>,
     pub(super) given: u64,
     pub(super) excerpt: Excerpt,
     first_ns: i64,
@@ -81,6 +83,7 @@ impl Frames {
         self.phase.push(frame.phase);
         self.t_s.push(t_s);
         self.number.push(self.given - 1);
+        self.joined.push(1);
         self.position_mm.push(frame.position_mm);
         self.covering_mm.push(frame.covering_mm);
         self.indenter.push(u16::try_from(indenter).unwrap_or(u16::MAX));
@@ -92,6 +95,10 @@ impl Frames {
         self.counts.extend_from_slice(frame.counts);
         if let Some((_, end)) = self.runs.last_mut() {
             *end += 1;
+        }
+        if self.excerpt.each > 1 {
+            // This one may join the last before it, which otherwise is complete and may join the one before that.
+            self.join(self.len().saturating_sub(3));
         }
         self.fit_in();
     }
@@ -106,14 +113,26 @@ impl Frames {
         self.t_s.is_empty()
     }
 
-    /// How many of the frames that were given are not there.
-    pub fn left_out(&self) -> u64 {
-        self.given - self.len() as u64
+    /// How many frames were given.
+    pub const fn given(&self) -> u64 {
+        self.given
     }
 
-    /// For each frame, its place among those that were given.
-    pub fn numbers(&self) -> &[u64] {
-        &self.number
+    /// How many of the frames that were given are not there, nor joined to others.
+    pub fn left_out(&self) -> u64 {
+        self.given - self.joined.iter().map(|joined| u64::from(*joined)).sum::<u64>()
+    }
+
+    /// Of how many frames that were given one here mostly is the mean.
+    pub fn joined(&self) -> u32 {
+        let mut joined = self.joined.clone();
+        joined.sort_unstable();
+        joined.get(joined.len() / 2).copied().unwrap_or(1)
+    }
+
+    /// For each frame, its place among those that were given; of some that were joined, that of the one in their middle.
+    pub fn numbers(&self) -> impl Iterator<Item = u64> {
+        self.number.iter().zip(&self.joined).map(|(number, joined)| number + u64::from((joined - 1) / 2))
     }
 
     /// The tip's way between a frame and the one before, as far as frames are left out there.

@@ -10,7 +10,7 @@ use crate::numbers::{NORMAL_PER_MEDIAN, median};
 /// A smaller movement counts as none, unless positions jitter by more.
 const STILL_MM: f64 = 0.001;
 /// What a step from frame to frame means is one over this time where frames are nearer to each other: that of the paper's sensor.
-const STRIDE_S: f64 = 1.0 / 30.0;
+pub(super) const STRIDE_S: f64 = 1.0 / 30.0;
 /// An interval that is longer than so many usual ones is a pause.
 const PAUSE: f64 = 2.5;
 /// A jitter of positions is told from rests in which no step from frame to frame is longer.

@@ -222,7 +222,10 @@ impl Problem<'_> {
         let place =
             |bin: usize| place(table.by, bins.t_s[bin], &frames.position_mm[bins.first[bin]], registration);
         let places: Vec<f64> = (0..bins.len()).map(place).collect();
-        let weights = |knot| places.iter().map(|place| hat(&table.at, knot, *place)).collect();
+        let weights = |knot| {
+            let hat = Hat::of(&table.at, knot);
+            places.iter().map(|place| hat.at(*place)).collect()
+        };
         (0..table.at.len()).map(weights).collect()
     }
 }
@@ -264,7 +267,7 @@ pub(crate) fn table_places(by: By, frames: &Frames, registration: &Registration)
     let mut places: Vec<f64> = (0..count).map(place).collect();
     // Moments of a short press among runs of hours may be the same one, and no frame may be between two depths.
     places.dedup();
-    let has_weight = |places: &[f64], at| pressed.iter().any(|one| hat(places, at, *one) > 0.0);
+    let has_weight = |places: &[f64], at| pressed.iter().any(|one| Hat::of(places, at).at(*one) > 0.0);
     while let Some(without) = (0..places.len()).find(|at| !has_weight(&places, *at)) {
         places.remove(without);
     }
@@ -316,12 +319,30 @@ pub(crate) fn places(curve: &FreeCurve, problem: &Problem<'_>) -> Vec<f64> {
 }
 
 /// The weight of a knot's value in a function that is straight between knots, and constant beyond the first and the last.
-pub(crate) fn hat(knots: &[f64], knot: usize, value: f64) -> f64 {
-    let slope = |from: Option<usize>| {
-        let from = from.and_then(|from| knots.get(from));
-        from.map_or(1.0, |from| (value - from) / (knots[knot] - from))
-    };
-    slope(knot.checked_sub(1)).min(slope(Some(knot + 1))).clamp(0.0, 1.0)
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Hat {
+    before: Option<f64>,
+    knot: f64,
+    after: Option<f64>,
+}
+
+impl Hat {
+    /// That of one of some knots, by its number.
+    pub(crate) fn of(knots: &[f64], knot: usize) -> Self {
+        let before = knot.checked_sub(1).map(|before| knots[before]);
+        Self { before, knot: knots[knot], after: knots.get(knot + 1).copied() }
+    }
+
+    /// The weight at a value: 0 from the neighbours of the knot on, which is where most values are.
+    pub(crate) fn at(self, value: f64) -> f64 {
+        let is_near =
+            self.before.is_none_or(|before| value > before) && self.after.is_none_or(|after| value < after);
+        if !is_near {
+            return 0.0;
+        }
+        let slope = |from: Option<f64>| from.map_or(1.0, |from| (value - from) / (self.knot - from));
+        slope(self.before).min(slope(self.after)).min(1.0)
+    }
 }
 
 fn even(most: f64, count: usize) -> Vec<f64> {

@@ -204,6 +204,7 @@ impl Stream<'_> {
     ) -> Result<(), DiscoverError> {
         let (predictor, first_bin, first) = (self.predictor, self.bin, predicted.len());
         predictor.has_worked(count, self.effects.len());
+        predicted.reserve(count * predictor.bins.elements);
         for bin in first_bin..first_bin + count {
             let path = &predictor.bins.paths[predictor.bins.run[bin]];
             let (moment, pipeline) = (predictor.moment(bin), self.pipeline(bin)?);
@@ -232,6 +233,7 @@ impl Stream<'_> {
         let Some(from) = self.from else { return self.take(count, wanted, predicted) };
         let (predictor, first_bin, first) = (self.predictor, self.bin, predicted.len());
         predictor.has_worked(count, self.effects.len());
+        predicted.reserve(count * predictor.bins.elements);
         let elements = predictor.bins.elements;
         let each = reached.signals_mm.len() / reached.contacts.len().max(1);
         let signals_mm = reached.signals_mm.chunks_exact(each.max(1));

@@ -67,6 +67,7 @@ impl<'a> Prepared<'a> {
         let still = still(frames);
         let declared_counts = known.array.step_counts();
         let step_counts = converter.as_ref().map_or(declared_counts, |one| one.step_counts(declared_counts));
+        let step_counts = Noise::step_of_means(frames, &still, step_counts);
         let (mut noise, floor) = Noise::measured(frames, &still, step_counts);
         if converter.as_ref().is_some_and(Converter::rounds) {
             // Steps so coarse round small signals the same way in every press.
@@ -74,11 +75,17 @@ impl<'a> Prepared<'a> {
         }
         let replicates = Noise::of(frames, &frames.counts, &still, step_counts).is_some();
         let mut warnings = Vec::new();
+        if frames.joined() > 1 {
+            warnings.push(format!(
+                "the recording is long and its sensor fast: each {} frames that follow each other are read as their mean, and what is faster is not looked for",
+                frames.joined()
+            ));
+        }
         if frames.left_out() > 0 {
             warnings.push(format!(
                 "the recording is long: {} of its {} frames are read, whole presses from all of it, and of the others only the tip's way",
-                frames.len(),
-                frames.len() as u64 + frames.left_out()
+                frames.given() - frames.left_out(),
+                frames.given()
             ));
         }
         if matches!(floor, Floor::Repeats { .. }) {

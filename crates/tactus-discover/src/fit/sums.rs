@@ -273,7 +273,7 @@ impl Problem<'_> {
         let mut sums = Sums {
             segment: segments.of_bin[part[0]],
             products: DMatrix::zeros(active.len(), active.len()),
-            border: Border::new(count, elements),
+            border: Border::new(active.len(), elements),
             active,
         };
         // Weighed readings of a column in some bins, times the roots of their weights: bin by bin, element by element.
@@ -300,7 +300,7 @@ impl Problem<'_> {
             for number in &of_all {
                 rooted(column(*number), bins, &roots, &mut values);
             }
-            sums.border.take(&of_all, &weighed, [&roots, &gains], &values);
+            sums.border.take(&weighed, [&roots, &gains], &values);
             let tile = DMatrix::from_vec(roots.len(), of_all.len(), std::mem::take(&mut values));
             sums.take(&tile, first, has_residual);
             let readings =
@@ -316,8 +316,12 @@ impl Problem<'_> {
 
 /// Values bin by bin, each bin's times its factor.
 fn times(values: &[f64], factors: &[f64]) -> Vec<f64> {
-    let of_bins = values.chunks_exact(values.len() / factors.len());
-    of_bins.zip(factors).flat_map(|(values, factor)| values.iter().map(move |value| factor * value)).collect()
+    let mut values = values.to_vec();
+    let each = values.len() / factors.len();
+    for (of_bin, factor) in values.chunks_exact_mut(each).zip(factors) {
+        of_bin.iter_mut().for_each(|value| *value *= factor);
+    }
+    values
 }
 
 /// A model whose gains are greater by a small share.
@@ -344,7 +348,7 @@ impl Running<'_> {
         let mut stream = stream.lock().unwrap_or_else(PoisonError::into_inner);
         let mut column = Vec::new();
         stream.take_on(bins.len(), reached, wanted, &mut column)?;
-        let now = predicted.chunks_exact(column.len() / bins.len()).skip(bins.start).flatten();
+        let now = &predicted[column.len() / bins.len() * bins.start..];
         column.iter_mut().zip(now).for_each(|(value, now)| *value = (*value - now) * per_step);
         Ok(column)
     }

@@ -22,6 +22,7 @@ pub(super) struct Sums {
     pub(super) active: Vec<usize>,
     /// Products of those: in the rows of the pivots and of the residual, and on the diagonal.
     pub(super) products: DMatrix<f64>,
+    /// That of those.
     pub(super) border: Border,
 }
 
@@ -92,9 +93,9 @@ impl Sums {
         let residual = has_residual.then(|| of_all - 1).filter(|residual| *residual >= first);
         for (nth, alone) in of_one.iter().enumerate() {
             let with = |others: &[f64]| of.values(alone).map(|(at, value)| value * others[at]).sum::<f64>();
-            self.border.by_baseline[(alone.element, alone.number)] += with(of.roots);
-            self.border.by_gain[(alone.element, alone.number)] += with(of.gains);
             let place = of_all + nth;
+            self.border.by_baseline[(alone.element, place)] += with(of.roots);
+            self.border.by_gain[(alone.element, place)] += with(of.gains);
             for other in (0..first).chain(residual) {
                 let start = other * tile.nrows();
                 self.products[(other, place)] += with(&tile.as_slice()[start..start + tile.nrows()]);
@@ -111,15 +112,8 @@ impl Sums {
 }
 
 impl Border {
-    /// Adds readings of a tile: of each, the root of its weight, the derivative by the gain and the directions that do something, times that
-    /// root.
-    pub(super) fn take(
-        &mut self,
-        active: &[usize],
-        weighed: &[usize],
-        [roots, gains]: [&[f64]; 2],
-        values: &[f64],
-    ) {
+    /// Adds readings of a tile: of each, the root of its weight, and the derivative by the gain and the first directions, times that root.
+    pub(super) fn take(&mut self, weighed: &[usize], [roots, gains]: [&[f64]; 2], values: &[f64]) {
         let per_bin = weighed.len().max(1);
         let of_bins = || roots.chunks_exact(per_bin).zip(gains.chunks_exact(per_bin));
         for (roots, gains) in of_bins() {
@@ -131,7 +125,7 @@ impl Border {
             }
         }
         let (mut by_baseline, mut by_gain) = (vec![0.0; per_bin], vec![0.0; per_bin]);
-        for (number, values) in active.iter().zip(values.chunks_exact(roots.len().max(1))) {
+        for (place, values) in values.chunks_exact(roots.len().max(1)).enumerate() {
             by_baseline.fill(0.0);
             by_gain.fill(0.0);
             for (values, (roots, gains)) in values.chunks_exact(per_bin).zip(of_bins()) {
@@ -143,8 +137,8 @@ impl Border {
                 }
             }
             for ((element, of_baseline), of_gain) in weighed.iter().zip(&by_baseline).zip(&by_gain) {
-                self.by_baseline[(*element, *number)] += *of_baseline;
-                self.by_gain[(*element, *number)] += *of_gain;
+                self.by_baseline[(*element, place)] += *of_baseline;
+                self.by_gain[(*element, place)] += *of_gain;
             }
         }
     }
@@ -157,6 +151,17 @@ impl Border {
     pub(super) fn add(&mut self, other: &Self) {
         self.by_baseline += &other.by_baseline;
         self.by_gain += &other.by_gain;
+        add(&mut self.own, &other.own);
+    }
+
+    /// Adds that of some directions.
+    pub(super) fn add_of(&mut self, active: &[usize], other: &Self) {
+        let pairs = [(&mut self.by_baseline, &other.by_baseline), (&mut self.by_gain, &other.by_gain)];
+        for (to, of) in pairs {
+            for (number, of) in active.iter().zip(of.column_iter()) {
+                to.column_mut(*number).zip_apply(&of, |to, of| *to += of);
+            }
+        }
         add(&mut self.own, &other.own);
     }
 }

@@ -78,7 +78,7 @@ impl Total {
                 self.products[(*row, *column)] += product;
             }
         }
-        self.segments[sums.segment].add(&sums.border);
+        self.segments[sums.segment].add_of(&sums.active, &sums.border);
         if kept == Kept::All {
             return;
         }
@@ -121,8 +121,12 @@ impl Block {
         for (place, number) in active.iter().enumerate() {
             self.diagonal[*number] += single(products[(place, place)]);
         }
-        self.by_baseline.zip_apply(&border.by_baseline, |to, of| *to += single(of));
-        self.by_gain.zip_apply(&border.by_gain, |to, of| *to += single(of));
+        let pairs = [(&mut self.by_baseline, &border.by_baseline), (&mut self.by_gain, &border.by_gain)];
+        for (to, of) in pairs {
+            for (number, of) in active.iter().zip(of.column_iter()) {
+                to.column_mut(*number).zip_apply(&of, |to, of| *to += single(of));
+            }
+        }
         add(&mut self.own, &border.own);
     }
 }

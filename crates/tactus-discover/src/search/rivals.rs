@@ -52,7 +52,7 @@ use super::jumps;
 use super::tones::{Tone, clearest, most_per_count};
 use super::varying::varying;
 use crate::data::{DiscoverError, OnWay};
-use crate::fit::{Direction, Fitted, Problem, hat};
+use crate::fit::{Direction, Fitted, Hat, Problem};
 
 /// Knots of a function of one covariate.
 const KNOTS: usize = 5;
@@ -338,18 +338,16 @@ impl Seen {
         let loud =
             |(bin, element): &(usize, usize)| seen.deep[*bin] && seen.share(*bin, *element) > SIGNAL_SHARE;
         let readings = (0..seen.deep.len()).flat_map(|bin| (0..seen.elements).map(move |e| (bin, e)));
-        let knots: Arc<Vec<f64>> = Arc::new(knots(
-            readings.filter(loud).map(|(bin, element)| value(seen, bin, element)).collect(),
-            JITTER,
-        ));
+        let knots =
+            knots(readings.filter(loud).map(|(bin, element)| value(seen, bin, element)).collect(), JITTER);
         let column = |knot: usize| -> Direction<'a> {
-            let (seen, knots) = (Arc::clone(seen), Arc::clone(&knots));
+            let (seen, hat) = (Arc::clone(seen), Hat::of(&knots, knot));
             Direction::Column(Box::new(move |bins: Range<usize>| {
                 let mut column = vec![0.0; bins.len() * seen.elements];
                 for (place, bin) in bins.enumerate().filter(|(_, bin)| seen.deep[*bin]) {
                     for element in 0..seen.elements {
                         column[place * seen.elements + element] =
-                            times(&seen, bin, element) * hat(&knots, knot, value(&seen, bin, element));
+                            times(&seen, bin, element) * hat.at(value(&seen, bin, element));
                     }
                 }
                 column
@@ -370,8 +368,9 @@ fn hats_of(values: &[f64], among: &[bool], jitter: f64) -> Vec<Vec<f64>> {
     let kept = values.iter().zip(among).filter(|(value, among)| **among && value.is_finite());
     let knots = knots(kept.map(|(value, _)| *value).collect(), jitter);
     let hat = |knot: usize| {
+        let hat = Hat::of(&knots, knot);
         let of = |(value, among): (&f64, &bool)| {
-            if *among && value.is_finite() { hat(&knots, knot, *value) } else { 0.0 }
+            if *among && value.is_finite() { hat.at(*value) } else { 0.0 }
         };
         values.iter().zip(among).map(of).collect()
     };

@@ -25,7 +25,7 @@
 //! With a free gain, an `own_share` of 0 and depths to 0.6 mm it follows the elastic laws `exp(a depth) - 1` (`a` from 1 to 6
 //! per mm) and `depth^p` (`p` from 1.2 to 2) within 0.5 % rms of the greatest response, and `depth^3` within 2 %.
 //!
-//! Cost: a power for each element.
+//! Cost: a power for each element, or one where `own_share` is 0.
 //!
 //! # Source
 //! The paper's Sec. 6: at large deformation the response grows nonlinearly by elastic hardening. The first odd term
@@ -78,8 +78,12 @@ impl OnCovering for Hardening {
     fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
         let depth_mm = depth_mm(now.base, contact);
         // An element that feels nothing feels no more of it; most do, between presses.
-        for u in signal_mm.iter_mut().filter(|u| **u != 0.0) {
-            *u *= 1.0 + self.growth.at(self.argument_mm(depth_mm, *u));
+        let felt = signal_mm.iter_mut().filter(|u| **u != 0.0);
+        if self.own_share == 0.0 {
+            let factor = 1.0 + self.growth.at(depth_mm);
+            felt.for_each(|u| *u *= factor);
+        } else {
+            felt.for_each(|u| *u *= 1.0 + self.growth.at(self.argument_mm(depth_mm, *u)));
         }
     }
 }

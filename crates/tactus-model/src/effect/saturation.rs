@@ -60,6 +60,9 @@ pub(super) static DEFINITION: Definition = Definition {
     make: Make::Element(|values| Box::new(Saturation { loss: Loss::of(values), counts_share: values[2] })),
 };
 
+/// A signal that loses less loses nothing: in double precision the share that is left is 1.
+const SHARE_LEAST: f64 = f64::EPSILON / 8.0;
+
 #[derive(Debug)]
 struct Saturation {
     loss: Loss,
@@ -69,7 +72,7 @@ struct Saturation {
 /// What share of a signal is lost.
 #[derive(Debug)]
 enum Loss {
-    Knee { knee: f64, q: f64 },
+    Knee { knee: f64, q: f64, least_mm: f64 },
     Free(Knots),
 }
 
@@ -92,14 +95,16 @@ impl Loss {
 
     fn knee(loss_at_1_mm: f64, knee: f64) -> Self {
         let kept_log = (-loss_at_1_mm).ln_1p();
-        Self::Knee { knee, q: (-knee * kept_log).exp_m1() }
+        let q = (-knee * kept_log).exp_m1();
+        // Most elements are far from the tip, and a power takes long.
+        Self::Knee { knee, q, least_mm: (SHARE_LEAST / q).powf(1.0 / knee) }
     }
 
     /// The share that is left of a signal: near 1 for small ones.
     fn kept(&self, argument_mm: f64) -> f64 {
         match self {
-            Self::Knee { q: 0.0, .. } => 1.0,
-            Self::Knee { knee, q } => (1.0 + q * argument_mm.powf(*knee)).powf(-1.0 / knee),
+            Self::Knee { least_mm, .. } if argument_mm < *least_mm => 1.0,
+            Self::Knee { knee, q, .. } => (1.0 + q * argument_mm.powf(*knee)).powf(-1.0 / knee),
             Self::Free(knots) => 1.0 - knots.line(argument_mm),
         }
     }

@@ -8,7 +8,7 @@ use tactus_model::{Covariate, Seen, Trace};
 
 use super::grammar::{Acting, Atom};
 use crate::data::{DiscoverError, interval_s};
-use crate::fit::{Direction, Fitted, Free, Grams, Problem, Term, hat};
+use crate::fit::{Direction, Fitted, Free, Grams, Hat, Problem, Term};
 
 /// Readings below this share of the largest signal of their bin do not place knots.
 const LOUD_SHARE: f64 = 0.02;
@@ -22,12 +22,11 @@ pub(super) const KNOTS_OF_ELEMENTS: usize = 3;
 /// The data as a draft sees them, bin by bin.
 pub(super) struct Sight {
     pub(super) elements: usize,
-    /// The history at each bin, as a pipeline has it.
-    traces: Vec<Trace>,
-    /// The signal of each reading, in mm.
-    signal_mm: Vec<f64>,
-    counts: Vec<f64>,
-    array: tactus_model::Array,
+    /// When a draft would act: for each bin whether it is then.
+    whens: Vec<(When, Vec<bool>)>,
+    /// The values of each covariate, in the order of all: bin by bin, or of one that differs from element to element reading by reading. NaN where
+    /// it has none.
+    covariates: Vec<Vec<f64>>,
     /// Median time between frames.
     interval_s: f64,
     /// Change of each reading by a unit of a carrier.
@@ -73,12 +72,28 @@ impl Sight {
                 signal_mm.push(straightened(linear, known.response.quadratic_per_mm[element]));
             }
         }
+        let seen = |bin: usize| Seen {
+            trace: &traces[bin],
+            array: &known.array,
+            signal_mm: &signal_mm[bin * elements..(bin + 1) * elements],
+            counts: &counts[bin * elements..(bin + 1) * elements],
+        };
+        let values = |covariate: &Covariate| {
+            let each = if covariate.is_of_element() { elements } else { 1 };
+            let mut values = Vec::with_capacity(bins.len() * each);
+            for bin in 0..bins.len() {
+                let of_bin = (0..each).map(|element| covariate.value(seen(bin), element));
+                values.extend(of_bin.map(|value| value.filter(|one| one.is_finite()).unwrap_or(f64::NAN)));
+            }
+            values
+        };
         let mut sight = Self {
             elements,
-            traces,
-            signal_mm,
-            counts,
-            array: known.array.clone(),
+            whens: When::ALL
+                .into_iter()
+                .map(|when| (when, traces.iter().map(|trace| when.is_now(trace)).collect()))
+                .collect(),
+            covariates: Covariate::ALL.iter().map(values).collect(),
             interval_s: interval_s(frames),
             units: Vec::new(),
         };
@@ -166,32 +181,40 @@ impl Sight {
     /// The values of a covariate at the bins at which a draft acts. Of one that differs from element to element they are those of readings
     /// with a signal, unless the carrier acts on the others as well.
     fn values(&self, (carrier, when, covariate): Acting) -> Vec<f64> {
-        let bins = (0..self.traces.len()).filter(|bin| when.is_now(&self.traces[*bin]));
+        let values = self.along(covariate);
+        let bins = self.bins_of(when);
         if !covariate.is_of_element() {
-            return bins
-                .filter_map(|bin| covariate.value(self.seen(bin), 0))
-                .filter(|v| v.is_finite())
-                .collect();
+            return bins.map(|bin| values[bin]).filter(|value| !value.is_nan()).collect();
         }
+        let signal_mm = self.along(Covariate::Signal);
         let of_bin = |bin: usize| {
-            let signal_mm = &self.signal_mm[bin * self.elements..(bin + 1) * self.elements];
+            let readings = bin * self.elements..(bin + 1) * self.elements;
+            let signal_mm = &signal_mm[readings.clone()];
             let largest = signal_mm.iter().copied().fold(0.0, f64::max);
             let is_of_all = matches!(carrier, Carrier::EveryElement | Carrier::Counts);
-            let is_loud = move |element: &usize| is_of_all || signal_mm[*element] > LOUD_SHARE * largest;
-            let value = move |element| covariate.value(self.seen(bin), element);
-            (0..self.elements).filter(is_loud).filter_map(value)
+            let is_loud = move |signal: f64| is_of_all || signal > LOUD_SHARE * largest;
+            values[readings]
+                .iter()
+                .zip(signal_mm)
+                .filter_map(move |(value, signal)| is_loud(*signal).then_some(*value))
         };
-        bins.flat_map(of_bin).filter(|value| value.is_finite()).collect()
+        bins.flat_map(of_bin).filter(|value| !value.is_nan()).collect()
     }
 
-    fn seen(&self, bin: usize) -> Seen<'_> {
-        let readings = bin * self.elements..(bin + 1) * self.elements;
-        Seen {
-            trace: &self.traces[bin],
-            array: &self.array,
-            signal_mm: &self.signal_mm[readings.clone()],
-            counts: &self.counts[readings],
-        }
+    /// The values of a covariate: bin by bin, or reading by reading.
+    fn along(&self, covariate: Covariate) -> &[f64] {
+        let place = Covariate::ALL.iter().position(|known| *known == covariate);
+        place.map_or(&[], |place| &self.covariates[place])
+    }
+
+    /// For each bin whether it is then.
+    fn is_then(&self, when: When) -> &[bool] {
+        self.whens.iter().find(|(known, _)| *known == when).map_or(&[], |(_, is_then)| is_then)
+    }
+
+    /// The bins at which a draft acts.
+    fn bins_of(&self, when: When) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.is_then(when).iter().enumerate().filter_map(|(bin, is_then)| is_then.then_some(bin))
     }
 
     /// What one unit of a carrier does to a reading.
@@ -206,15 +229,14 @@ impl Sight {
         covariate: Covariate,
         when: When,
     ) -> impl Iterator<Item = (usize, f64, f64)> + Clone + '_ {
-        let unit = self.unit_of(carrier);
-        let bins = (0..self.traces.len()).filter(move |bin| when.is_now(&self.traces[*bin]));
-        bins.flat_map(move |bin| {
-            let of = move |element: usize| {
-                let reading = bin * self.elements + element;
-                let value = covariate.value(self.seen(bin), element)?;
-                Some((reading, value, f64::from(unit[reading])))
+        let (unit, values) = (self.unit_of(carrier), self.along(covariate));
+        let is_common = !covariate.is_of_element();
+        self.bins_of(when).flat_map(move |bin| {
+            let of = move |reading: usize| {
+                let value = values[if is_common { bin } else { reading }];
+                (!value.is_nan()).then(|| (reading, value, f64::from(unit[reading])))
             };
-            (0..self.elements).filter_map(of)
+            (bin * self.elements..(bin + 1) * self.elements).filter_map(of)
         })
     }
 
@@ -236,18 +258,25 @@ impl Sight {
         let elements = only.map_or(0..self.elements, |element| element..element + 1);
         let mut column = vec![0.0; bins.len() * elements.len()];
         let first_bin = bins.start;
-        let is_common = !atom.covariates.iter().any(|covariate| covariate.is_of_element());
-        for bin in bins {
-            if !atom.when.is_now(&self.traces[bin]) {
-                continue;
+        let is_then = self.is_then(atom.when);
+        let factor = atom.factor(curve);
+        let at: Vec<(&[f64], bool)> =
+            atom.covariates.iter().map(|one| (self.along(*one), one.is_of_element())).collect();
+        let is_common = at.iter().all(|(_, is_of_element)| !is_of_element);
+        let factor = |bin: usize, element: usize| {
+            let mut values = [0.0; 2];
+            for (value, (along, is_of_element)) in values.iter_mut().zip(&at) {
+                *value = along[if *is_of_element { bin * self.elements + element } else { bin }];
             }
-            let seen = self.seen(bin);
-            let common = if is_common { atom.factor(curve, seen, 0) } else { 0.0 };
+            factor.at(values)
+        };
+        for bin in bins.filter(|bin| is_then[*bin]) {
+            let common = if is_common { factor(bin, 0) } else { 0.0 };
             if is_common && common == 0.0 {
                 continue;
             }
             for element in elements.clone() {
-                let factor = if is_common { common } else { atom.factor(curve, seen, element) };
+                let factor = if is_common { common } else { factor(bin, element) };
                 let weight = atom.weights.as_ref().map_or(1.0, |weights| weights[element]);
                 let reading = bin * self.elements + element;
                 column[(bin - first_bin) * elements.len() + element - elements.start] =
@@ -317,31 +346,77 @@ fn straightened(linear: f64, quadratic_per_mm: f64) -> f64 {
     (root.sqrt() - 1.0) / (2.0 * quadratic_per_mm)
 }
 
+/// What an atom, or a part of it, multiplies its carrier by.
+enum Factor<'a> {
+    /// 1 wherever the covariates have values: so many of them.
+    One(usize),
+    /// Of a tone, sine and cosine.
+    Tone { per_unit: f64, parts: [f64; 2] },
+    /// The hats of a knot of each covariate.
+    Hats([Option<Hat>; 2]),
+    /// A curve through its knots, and for two covariates a table.
+    Curve { knots: &'a [Vec<f64>], values: &'a [f64] },
+}
+
 impl Atom {
-    /// The product of the hats of a pair of knots, or of all with a curve.
-    pub(super) fn factor(&self, curve: Option<usize>, seen: Seen<'_>, element: usize) -> f64 {
-        let mut values = [0.0; 2];
-        for (value, covariate) in values.iter_mut().zip(&self.covariates) {
-            match covariate.value(seen, element).filter(|value| value.is_finite()) {
-                Some(known) => *value = known,
-                None => return 0.0,
-            }
+    /// That of a knot, or of a pair of them, or of all with the curve.
+    fn factor(&self, part: Option<usize>) -> Factor<'_> {
+        if let Some(per_unit) = self.per_unit {
+            let parts = match (part, &self.curve) {
+                (Some(part), _) => std::array::from_fn(|one| f64::from(u8::from(one == part))),
+                (None, Some(curve)) => [curve[0], curve[1]],
+                (None, None) => return Factor::One(self.covariates.len()),
+            };
+            return Factor::Tone { per_unit, parts };
         }
-        let turn = self.per_unit.map(|per_unit| (std::f64::consts::TAU * per_unit * values[0]).sin_cos());
-        let at = |knot: usize| match (turn, self.knots.as_slice()) {
-            (Some((sin, cos)), _) => [sin, cos][knot],
-            (None, [only]) => hat(only, knot, values[0]),
-            (None, [first, second]) => {
-                hat(first, knot / second.len(), values[0]) * hat(second, knot % second.len(), values[1])
-            }
-            (None, _) => 1.0,
-        };
-        match (curve, &self.curve) {
-            (Some(knot), _) => at(knot),
-            (None, Some(curve)) => curve.iter().enumerate().map(|(knot, value)| value * at(knot)).sum(),
-            (None, None) => 1.0,
+        match (part, self.knots.as_slice(), &self.curve) {
+            (Some(knot), [only], _) => Factor::Hats([Some(Hat::of(only, knot)), None]),
+            (Some(knot), [first, second], _) => Factor::Hats([
+                Some(Hat::of(first, knot / second.len())),
+                Some(Hat::of(second, knot % second.len())),
+            ]),
+            (None, knots @ ([_] | [_, _]), Some(curve)) => Factor::Curve { knots, values: curve },
+            _ => Factor::One(self.covariates.len()),
         }
     }
+}
+
+impl Factor<'_> {
+    /// Its value at those of the covariates; 0 where one has none.
+    fn at(&self, at: [f64; 2]) -> f64 {
+        match self {
+            Self::One(covariates) => f64::from(u8::from(!at[..*covariates].iter().any(|one| one.is_nan()))),
+            Self::Tone { .. } | Self::Curve { .. } if at.iter().any(|one| one.is_nan()) => 0.0,
+            Self::Tone { per_unit, parts: [of_sin, of_cos] } => {
+                let (sin, cos) = (std::f64::consts::TAU * per_unit * at[0]).sin_cos();
+                of_sin * sin + of_cos * cos
+            }
+            Self::Hats([first, second]) => {
+                let of_first = first.map_or(1.0, |hat| hat.at(at[0]));
+                if of_first == 0.0 { 0.0 } else { of_first * second.map_or(1.0, |hat| hat.at(at[1])) }
+            }
+            Self::Curve { knots, values } => match knots {
+                [only] => beside(only, at[0]).iter().map(|(knot, part)| values[*knot] * part).sum(),
+                [first, second, ..] => {
+                    let columns = beside(second, at[1]);
+                    let of_row = |(row, by_row): (usize, f64)| {
+                        columns.map(|(column, part)| values[row * second.len() + column] * (by_row * part))
+                    };
+                    beside(first, at[0]).into_iter().flat_map(of_row).sum()
+                }
+                [] => 1.0,
+            },
+        }
+    }
+}
+
+/// The knots before and after a value, each with its hat there; all others' are 0.
+fn beside(knots: &[f64], value: f64) -> [(usize, f64); 2] {
+    let after = knots.partition_point(|knot| *knot <= value).min(knots.len() - 1);
+    let before = after.saturating_sub(1);
+    // Of the only knot once.
+    let share = if before == after { 0.0 } else { Hat::of(knots, before).at(value) };
+    [(before, share), (after, Hat::of(knots, after).at(value))]
 }
 
 #[cfg(test)]

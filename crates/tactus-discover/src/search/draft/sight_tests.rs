@@ -1,5 +1,6 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use tactus_model::Covariate;
 
 use super::Sight;
 use crate::fit::{Fitted, Prepared, RandomWalk};
@@ -24,6 +25,10 @@ fn a_draft_does_not_see_a_walk_of_the_zeros() {
         one.iter().zip(other).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
     };
     assert!(most(&prepared.base.predicted, &walking.predicted) > 30.0);
-    assert!(most(&without.counts, &with.counts) < 1e-9, "{}", most(&without.counts, &with.counts));
-    assert!(most(&without.signal_mm, &with.signal_mm) < 1e-9);
+    assert!(
+        most(without.along(Covariate::Counts), with.along(Covariate::Counts)) < 1e-9,
+        "{}",
+        most(without.along(Covariate::Counts), with.along(Covariate::Counts))
+    );
+    assert!(most(without.along(Covariate::Signal), with.along(Covariate::Signal)) < 1e-9);
 }

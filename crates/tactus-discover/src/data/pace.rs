@@ -1,0 +1,175 @@
+//! The pace of a fast sensor: frames that follow each other are read as their mean.
+//!
+//! What a discovery looks at changes within a press, in tenths of a second. A sensor of 1,000 frames a second fills what may be read
+//! ([`super::excerpt`]) within ten presses. Where there are too many frames, each two are joined, and again each two of those, as long as a frame is left as
+//! often as the paper's sensor gives one. Only then whole presses are left out.
+//!
+//! Frames are joined within a stretch: one run, press, phase and tool, with the tip on one side of the surface, and no pause between them. What is left at the
+//! end of a stretch is joined to the frame before, if it is less than half of one. A frame is thus the mean of half to one and a half times as many as most.
+//!
+//! A mean over a thirtieth of a second hides a faster tone, and gives it another frequency. So no frames are joined where a line stands out of the
+//! spectrum of what the elements read out of contact.
+
+use super::frames::Frames;
+use super::motion::{STRIDE_S, interval_s};
+use super::spectrum;
+
+/// The middles of two frames that are joined are apart by so much of [`STRIDE_S`] at most: in a stretch by half, and at its end by three quarters.
+const APART: f64 = 0.75;
+
+/// Frames of one stretch that become one.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    first: usize,
+    end: usize,
+    /// The frames that were given.
+    given: u32,
+}
+
+impl Frames {
+    /// Joins each two frames, if that leaves enough in a second. False if none were joined.
+    pub(super) fn slow_down(&mut self) -> bool {
+        if 2.0 * interval_s(self) > STRIDE_S || !self.is_without_tones() {
+            return false;
+        }
+        let (before, each) = (self.len(), self.excerpt.each);
+        self.excerpt.each *= 2;
+        self.join(0);
+        let is_slower = self.len() < before;
+        if !is_slower {
+            self.excerpt.each = each;
+        }
+        is_slower
+    }
+
+    /// True if no line stands out of the spectrum. It is looked for once, as long as frames are as they were given.
+    fn is_without_tones(&mut self) -> bool {
+        if let Some(known) = self.excerpt.is_without_tones {
+            return known;
+        }
+        let counts: Vec<f64> = self.counts.iter().map(|counts| f64::from(*counts)).collect();
+        let is_without = spectrum::lines(self, 1, &counts).is_empty();
+        self.excerpt.is_without_tones = Some(is_without);
+        is_without
+    }
+
+    /// Joins those of the last frames, from one on, that belong together. The last of all may still be joined by frames to come.
+    pub(super) fn join(&mut self, from: usize) {
+        let groups = self.groups(from);
+        if groups.len() == self.len() - from {
+            return;
+        }
+        for (place, group) in (from..).zip(&groups) {
+            self.become_one(place, *group);
+        }
+        let count = from + groups.len();
+        // Where a frame is now, or the end before it.
+        let place = |old: usize| from + groups.partition_point(|group| group.first < old);
+        for (_, end) in self.runs.iter_mut().rev().take_while(|(_, end)| *end > from) {
+            *end = place(*end);
+        }
+        for (_, first) in self.excerpt.read.iter_mut().rev().take_while(|(_, first)| *first > from) {
+            *first = place(*first);
+        }
+        for point in self.way.iter_mut().rev().take_while(|point| point.before > from) {
+            point.before = place(point.before);
+        }
+        self.truncate(count);
+    }
+
+    fn groups(&self, from: usize) -> Vec<Group> {
+        let each = self.excerpt.each;
+        let mut full: Vec<Group> = Vec::new();
+        for frame in from..self.len() {
+            let given = self.joined[frame];
+            match full.last_mut() {
+                Some(last) if last.given + given <= each && self.follows(frame) => {
+                    (last.end, last.given) = (frame + 1, last.given + given);
+                }
+                _ => full.push(Group { first: frame, end: frame + 1, given }),
+            }
+        }
+        let open = full.pop();
+        let mut groups: Vec<Group> = Vec::new();
+        for group in full {
+            match groups.last_mut() {
+                Some(last) if 2 * group.given < each && self.follows(group.first) => {
+                    (last.end, last.given) = (group.end, last.given + group.given);
+                }
+                _ => groups.push(group),
+            }
+        }
+        groups.extend(open);
+        groups
+    }
+
+    /// True if a frame is of one stretch with the one before.
+    fn follows(&self, frame: usize) -> bool {
+        let before = frame - 1;
+        let is_above = |frame: usize| self.position_mm[frame][2] > 0.0;
+        let apart_s = self.t_s[frame] - self.t_s[before];
+        let begins_run = || self.runs.binary_search_by_key(&frame, |(_, end)| *end).is_ok();
+        let begins_part = || self.excerpt.read.binary_search_by_key(&frame, |(_, first)| *first).is_ok();
+        self.press[frame] == self.press[before]
+            && self.phase[frame] == self.phase[before]
+            && self.indenter[frame] == self.indenter[before]
+            && self.covering_mm[frame].to_bits() == self.covering_mm[before].to_bits()
+            && self.temperature_c[frame].is_nan() == self.temperature_c[before].is_nan()
+            && is_above(frame) == is_above(before)
+            && apart_s > 0.0
+            && apart_s <= APART * STRIDE_S
+            && !begins_run()
+            && !begins_part()
+            && !self.is_after_gap(frame)
+    }
+
+    /// Puts the mean of a group at a place that is no later than its first frame.
+    fn become_one(&mut self, place: usize, Group { first, end, given }: Group) {
+        let elements = self.elements;
+        let shares: Vec<f64> =
+            self.joined[first..end].iter().map(|joined| f64::from(*joined) / f64::from(given)).collect();
+        let mean = |value: &dyn Fn(usize) -> f64| {
+            (first..end).zip(&shares).map(|(frame, share)| share * value(frame)).sum::<f64>()
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "as precise as a reading")]
+        let single = |value: f64| value as f32;
+        if end > first + 1 {
+            self.t_s[place] = mean(&|frame| self.t_s[frame]);
+            self.position_mm[place] =
+                std::array::from_fn(|axis| mean(&|frame| self.position_mm[frame][axis]));
+            self.temperature_c[place] = single(mean(&|frame| f64::from(self.temperature_c[frame])));
+            for element in 0..elements {
+                let counts = mean(&|frame| f64::from(self.counts[frame * elements + element]));
+                self.counts[place * elements + element] = single(counts);
+            }
+        } else {
+            self.t_s[place] = self.t_s[first];
+            self.position_mm[place] = self.position_mm[first];
+            self.temperature_c[place] = self.temperature_c[first];
+            self.counts.copy_within(first * elements..end * elements, place * elements);
+        }
+        self.number[place] = self.number[first];
+        self.press[place] = self.press[first];
+        self.phase[place] = self.phase[first];
+        self.covering_mm[place] = self.covering_mm[first];
+        self.indenter[place] = self.indenter[first];
+        self.joined[place] = given;
+    }
+
+    fn truncate(&mut self, count: usize) {
+        self.number.truncate(count);
+        self.press.truncate(count);
+        self.phase.truncate(count);
+        self.t_s.truncate(count);
+        self.position_mm.truncate(count);
+        self.covering_mm.truncate(count);
+        self.indenter.truncate(count);
+        self.temperature_c.truncate(count);
+        self.joined.truncate(count);
+        self.counts.truncate(count * self.elements);
+    }
+}
+
+#[cfg(test)]
+#[path = "pace_tests.rs"]
+mod tests;
