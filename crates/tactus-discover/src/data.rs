@@ -49,6 +49,7 @@
 //! | converter.rs | `FAR` | `6.0` | derived | `2e-9` of a normal distribution lies beyond |
 //! | excerpt.rs | `READINGS_MOST` | `48 * 24_000` | cost | time and memory of any recording (decisions 0050 and 0053); 48,000 and 42,000 frames at first |
 //! | excerpt.rs | `PART_SHARE` | `16` | cost | a part is small beside what may be read |
+//! | excerpt.rs | `POINTS_AT_ONCE` | `2048` | cost | time that may grow with their square |
 //! | excerpt.rs | `OFF_MM` | `0.02` | convention | as repeats tell places apart |
 //! | faulty.rs | `NOISY` | `3.0` | convention | three times the median |
 //! | faulty.rs | `CROSS_WIRED_ONE_IN` | `10` | convention | more would be another fault |
@@ -71,7 +72,6 @@
 //! | noise.rs | `DIFFERENCES_SHARE` | `2.0 / 3.0` | derived | von Neumann et al., in the comment |
 //! | noise.rs | `QUIETEST` | `0.7` | convention | below it, rounding looks the same |
 //! | noise.rs | `MEDIAN_SIZE` | `0.674_490` | derived | median of `abs` of a normal deviate |
-//! | noise.rs | `DITHERED_STEPS` | `0.5` | derived | `e^-10` of the bias is left ([`noise`]) |
 //! | noise.rs | `ALL_ROUNDING` | `0.9` | convention | 0.9 of the noise |
 //! | noise/repeats.rs | `PLACE_MM` | `0.02` | convention | places that differ by less are one |
 //! | noise/repeats.rs | `DEPTH_MM` | `0.005` | convention | the same, of depths |
@@ -86,7 +86,10 @@
 //! | noise/stretches.rs | `FRAMES_EACH` | `10.0` | convention | of the greatest autocorrelation that short dwells show |
 //! | noise/stretches.rs | `HALVINGS` | `20` | derived | a millionth of the interval |
 //! | noise/stretches.rs | `GROUPS` | `20` | convention | of a jackknife |
-//! | pace.rs | `APART` | `0.75` | derived | of full frames and a half one |
+//! | pace.rs | `APART` | `0.55` | derived | two of half a stride, and a tenth of jitter |
+//! | pace.rs | `APART_AT_END` | `0.75` | derived | a full frame and less than half of one |
+//! | pace.rs | `DITHERED_STEPS` | `0.577` | derived | root of `1 / 4 + 1 / 12`; `e^-10` of what repeats is left |
+//! | pace.rs | `IDLE_LEAST` | `256` | convention | as `FRAMES_LEAST` of a spectrum |
 //! | spectrum.rs | `STANDS_OUT` | `8.0` | tried | 6 at first; no recipe |
 //! | spectrum.rs | `RECORDINGS_PER_FALSE_LINE` | `50.0` | convention | one recording of noise in fifty (decision 0055) |
 //! | spectrum.rs | `PHASES_PER_COLUMN` | `2` | derived | so that no phase is more than a quarter of a turn, over all columns, from one looked at |

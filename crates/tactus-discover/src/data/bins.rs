@@ -147,7 +147,7 @@ impl Bins {
     /// Sets the bins' weights from the noise, and divides them into blocks.
     pub(crate) fn weigh(&mut self, frames: &Frames, noise: &Noise, heldout: &HeldOut) {
         let interval_s = interval_s(frames);
-        let turns = turns(frames);
+        let (turns, shares) = (turns(frames), frames.shares());
         let block_s = BLOCK_S.max(10.0 * noise.memory_frames() as f64 * interval_s);
         let mut block = 0;
         let mut began = 0;
@@ -155,7 +155,8 @@ impl Bins {
             let (frame, start) = (self.first[bin], self.first[began]);
             self.heldout[bin] = heldout.frames[frame];
             let count = self.frames_in(bin);
-            let whole = count as f64 / noise.inflation(count);
+            let members = self.first[bin]..self.first[bin + 1];
+            let whole = shares[members].iter().sum::<f64>() / noise.inflation(count);
             self.weight[bin] = if turns[frame] { 0.0 } else { whole };
             let other = self.run[bin] != self.run[began]
                 || frames.press[frame] != frames.press[start]

@@ -75,8 +75,19 @@ pub(crate) struct Gap {
 impl Converter {
     /// How the converter of these readings differs from one of the declared step, if they show it.
     pub(crate) fn seen(frames: &Frames, declared_counts: f64) -> Option<Self> {
+        // Means lie on no lattice, or on one of their own.
+        if frames.joined() > 1 {
+            return None;
+        }
         let codes = Frequencies::of(&frames.counts);
         codes.wider_steps(declared_counts).or_else(|| codes.gaps(frames, declared_counts))
+    }
+
+    /// The step of the lattice on which all readings lie, if they lie on one.
+    pub(super) fn step_of(readings: &[f32]) -> Option<f64> {
+        let codes = Frequencies::of(readings).counts;
+        // The ends of the range need not be a whole number of steps apart from the others.
+        lattice_step(codes.get(1..codes.len().saturating_sub(1))?)
     }
 
     /// True if its steps are wider than declared.

@@ -1,9 +1,8 @@
 //! Which frames of a long recording are read, so that what a discovery costs is bounded.
 //!
-//! Up to [`READINGS_MOST`] readings all are read. Of a longer recording one part of two is, then one of four, and so on. A part is a press with
+//! Up to [`READINGS_MOST`] readings all are read. Of a longer recording frames of a fast sensor are joined first ([`super::pace`]). Then one part of two is, then one of four, and so on. A part is a press with
 //! the rest that follows it, up to the next press; one with more than one in [`PART_SHARE`] of the frames that may be read counts as several.
-//! Which one of a group is read is drawn, because presses often come in an order that repeats. Before that, frames of a fast sensor are joined
-//! ([`super::pace`]).
+//! Which one of a group is read is drawn, because presses often come in an order that repeats.
 //!
 //! Of the other parts the tip's way is kept ([`super::way`]), because a covering remembers presses.
 //!
@@ -19,6 +18,8 @@ const READINGS_MOST: usize = 48 * 24_000;
 const PART_SHARE: usize = 16;
 /// Straight lines leave the way by at most so much.
 const OFF_MM: f64 = 0.02;
+/// Points of a way that are thinned out together: the time may grow with their square.
+const POINTS_AT_ONCE: usize = 2048;
 /// Changes the seed of each group's draw.
 const STREAM: u64 = 0x0065_7863_6572_7074;
 
@@ -28,8 +29,8 @@ pub(super) struct Excerpt {
     pub(super) frames_most: usize,
     /// So many frames that are given are joined to one.
     pub(super) each: u32,
-    /// Whether a line stands out of the spectrum, once that is known.
-    pub(super) is_without_tones: Option<bool>,
+    /// Whether frames may be joined; `None` before that was asked.
+    pub(super) may_be_joined: Option<bool>,
     /// Of `2^halvings` parts one is read.
     halvings: u32,
     /// Run and press of the last frame that was given; -1 before the run's first press.
@@ -60,7 +61,7 @@ impl Excerpt {
         Self {
             frames_most,
             each: 1,
-            is_without_tones: None,
+            may_be_joined: None,
             halvings: 0,
             run: String::new(),
             press: -1,
@@ -95,8 +96,10 @@ impl Frames {
             self.excerpt.press = -1;
         }
         let is_other_press = press >= 0 && press != self.excerpt.press;
-        let most = self.excerpt.frames_most.div_ceil(PART_SHARE) as u64 * u64::from(self.excerpt.each);
-        let is_full = self.excerpt.length >= most;
+        let most = self.excerpt.frames_most.div_ceil(PART_SHARE);
+        let kept = self.excerpt.read.last().map_or(0, |(_, first)| self.len() - first);
+        let is_full = self.excerpt.length >= most as u64 * u64::from(self.excerpt.each)
+            || self.excerpt.reads && kept >= most;
         if is_other_run || is_other_press || is_full {
             self.next_part(is_other_run);
         }
@@ -113,7 +116,7 @@ impl Frames {
         let gap = self.way.split_off(self.way.partition_point(|point| point.before < next));
         // Where no frame of a run follows, nobody asks for its way.
         if !is_other_run {
-            self.way.extend(bends(&gap, OFF_MM));
+            self.way.extend(gap.chunks(POINTS_AT_ONCE).flat_map(|some| bends(some, OFF_MM)));
         }
         self.shorten_way();
         let number = self.excerpt.parts;

@@ -123,13 +123,6 @@ impl Frames {
         self.given - self.joined.iter().map(|joined| u64::from(*joined)).sum::<u64>()
     }
 
-    /// Of how many frames that were given one here mostly is the mean.
-    pub fn joined(&self) -> u32 {
-        let mut joined = self.joined.clone();
-        joined.sort_unstable();
-        joined.get(joined.len() / 2).copied().unwrap_or(1)
-    }
-
     /// For each frame, its place among those that were given; of some that were joined, that of the one in their middle.
     pub fn numbers(&self) -> impl Iterator<Item = u64> {
         self.number.iter().zip(&self.joined).map(|(number, joined)| number + u64::from((joined - 1) / 2))

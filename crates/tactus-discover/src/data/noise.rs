@@ -46,9 +46,6 @@ pub(crate) const QUIETEST: f64 = 0.7;
 /// Median absolute value of a standard normal deviate.
 const MEDIAN_SIZE: f64 = 0.674_490;
 
-/// Noise of so many steps dithers what a converter rounds: of its rounding next to nothing repeats.
-const DITHERED_STEPS: f64 = 0.5;
-
 /// Where rounding that repeats is this share of the noise, nothing dithers.
 const ALL_ROUNDING: f64 = 0.9;
 
@@ -91,18 +88,6 @@ impl Noise {
             return (noise, Floor::Repeats { rms_counts, freedom });
         }
         (Self::of_differences(frames, step_counts), Floor::None)
-    }
-
-    /// The step with which means of some readings scatter as single ones do with the converter's own: smaller by the root of their number where noise
-    /// dithers the readings, and the same where it does not.
-    pub(crate) fn step_of_means(frames: &Frames, still: &[usize], step_counts: f64) -> f64 {
-        let root = f64::from(frames.joined()).sqrt();
-        let of_means = step_counts / root;
-        let is_dithered = || {
-            let (noise, _) = Self::measured(frames, still, of_means);
-            noise.rms_counts * root > DITHERED_STEPS * step_counts
-        };
-        if root > 1.0 && is_dithered() { of_means } else { step_counts }
     }
 
     /// The noise from repeats in time of counts or of a model's residual, frame by frame, element by element, and its degrees

@@ -1,21 +1,31 @@
-//! The pace of a fast sensor: frames that follow each other are read as their mean.
+//! The pace of a fast sensor: of a long recording, frames that follow each other are read as their mean.
 //!
 //! What a discovery looks at changes within a press, in tenths of a second. A sensor of 1,000 frames a second fills what may be read
 //! ([`super::excerpt`]) within ten presses. Where there are too many frames, each two are joined, and again each two of those, as long as a frame is left as
 //! often as the paper's sensor gives one. Only then whole presses are left out.
 //!
 //! Frames are joined within a stretch: one run, press, phase and tool, with the tip on one side of the surface, and no pause between them. What is left at the
-//! end of a stretch is joined to the frame before, if it is less than half of one. A frame is thus the mean of half to one and a half times as many as most.
+//! end of a stretch is joined to the frame before, if it is less than half of one. A frame is thus the mean of half to one and a half times as many as most,
+//! unless its stretch is shorter.
 //!
 //! A mean over a thirtieth of a second hides a faster tone, and gives it another frequency. So no frames are joined where a line stands out of the
-//! spectrum of what the elements read out of contact.
+//! spectrum of what the elements read, nor where their noise is too small beside the converter's step for means to tell more than single readings. Both are
+//! asked once, of the frames that come first.
 
+use super::converter::Converter;
 use super::frames::Frames;
 use super::motion::{STRIDE_S, interval_s};
+use super::noise::Noise;
 use super::spectrum;
 
-/// The middles of two frames that are joined are apart by so much of [`STRIDE_S`] at most: in a stretch by half, and at its end by three quarters.
-const APART: f64 = 0.75;
+/// A frame and the next that joins it are apart by so much of [`STRIDE_S`] at most: two of half a stride, with some jitter.
+const APART: f64 = 0.55;
+/// The same of what is left at the end of a stretch: a full frame and less than half of one.
+const APART_AT_END: f64 = 0.75;
+/// Noise of half a step, and the rounding beside it, in steps: it dithers so well that next to nothing of the rounding repeats.
+const DITHERED_STEPS: f64 = 0.577;
+/// Fewer frames out of contact do not show a tone.
+const IDLE_LEAST: usize = 256;
 
 /// Frames of one stretch that become one.
 #[derive(Debug, Clone, Copy)]
@@ -29,7 +39,7 @@ struct Group {
 impl Frames {
     /// Joins each two frames, if that leaves enough in a second. False if none were joined.
     pub(super) fn slow_down(&mut self) -> bool {
-        if 2.0 * interval_s(self) > STRIDE_S || !self.is_without_tones() {
+        if 2.0 * interval_s(self) > STRIDE_S || !self.may_be_joined() {
             return false;
         }
         let (before, each) = (self.len(), self.excerpt.each);
@@ -42,15 +52,54 @@ impl Frames {
         is_slower
     }
 
-    /// True if no line stands out of the spectrum. It is looked for once, as long as frames are as they were given.
-    fn is_without_tones(&mut self) -> bool {
-        if let Some(known) = self.excerpt.is_without_tones {
+    /// True if means tell as much as the frames that they are of. It is asked as long as frames are as they were given.
+    fn may_be_joined(&mut self) -> bool {
+        if let Some(known) = self.excerpt.may_be_joined {
             return known;
         }
+        let idle = self.position_mm.iter().filter(|position_mm| position_mm[2] > 0.0).count();
+        if idle < IDLE_LEAST {
+            return false;
+        }
+        let may_be = self.is_without_tones() && self.is_dithered();
+        self.excerpt.may_be_joined = Some(may_be);
+        may_be
+    }
+
+    fn is_without_tones(&self) -> bool {
         let counts: Vec<f64> = self.counts.iter().map(|counts| f64::from(*counts)).collect();
-        let is_without = spectrum::lines(self, 1, &counts).is_empty();
-        self.excerpt.is_without_tones = Some(is_without);
-        is_without
+        spectrum::lines(self, 1, &counts).is_empty()
+            && spectrum::lines_in_contact(self, 1, &counts).is_empty()
+    }
+
+    /// True if the noise moves readings by more than the step on which all of them lie.
+    fn is_dithered(&self) -> bool {
+        let step_counts = Converter::step_of(&self.counts).unwrap_or(0.0);
+        Noise::of_differences(self, step_counts).rms_counts >= DITHERED_STEPS * step_counts
+    }
+
+    /// Of how many frames that were given one here mostly is the mean: half of those are in frames of no more.
+    pub fn joined(&self) -> u32 {
+        let mut joined = self.joined.clone();
+        joined.sort_unstable();
+        let all: u64 = joined.iter().map(|joined| u64::from(*joined)).sum();
+        let mut so_far = 0;
+        let is_half = |joined: &u32| {
+            so_far += u64::from(*joined);
+            2 * so_far >= all
+        };
+        joined.into_iter().find(is_half).unwrap_or(1)
+    }
+
+    /// For each frame, of how many frames it is the mean beside most.
+    pub(crate) fn shares(&self) -> Vec<f64> {
+        let usual = f64::from(self.joined());
+        self.joined.iter().map(|joined| f64::from(*joined) / usual).collect()
+    }
+
+    /// The step with which the frames scatter as single readings do with the converter's own: noise dithers what is joined.
+    pub(crate) fn step_of_means(&self, step_counts: f64) -> f64 {
+        step_counts / f64::from(self.joined()).sqrt()
     }
 
     /// Joins those of the last frames, from one on, that belong together. The last of all may still be joined by frames to come.
@@ -63,7 +112,7 @@ impl Frames {
             self.become_one(place, *group);
         }
         let count = from + groups.len();
-        // Where a frame is now, or the end before it.
+        // The new place of a frame that begins a group, or of the end.
         let place = |old: usize| from + groups.partition_point(|group| group.first < old);
         for (_, end) in self.runs.iter_mut().rev().take_while(|(_, end)| *end > from) {
             *end = place(*end);
@@ -83,7 +132,7 @@ impl Frames {
         for frame in from..self.len() {
             let given = self.joined[frame];
             match full.last_mut() {
-                Some(last) if last.given + given <= each && self.follows(frame) => {
+                Some(last) if last.given + given <= each && self.follows(frame, APART) => {
                     (last.end, last.given) = (frame + 1, last.given + given);
                 }
                 _ => full.push(Group { first: frame, end: frame + 1, given }),
@@ -93,7 +142,7 @@ impl Frames {
         let mut groups: Vec<Group> = Vec::new();
         for group in full {
             match groups.last_mut() {
-                Some(last) if 2 * group.given < each && self.follows(group.first) => {
+                Some(last) if 2 * group.given < each && self.follows(group.first, APART_AT_END) => {
                     (last.end, last.given) = (group.end, last.given + group.given);
                 }
                 _ => groups.push(group),
@@ -103,8 +152,8 @@ impl Frames {
         groups
     }
 
-    /// True if a frame is of one stretch with the one before.
-    fn follows(&self, frame: usize) -> bool {
+    /// True if a frame is of one stretch with the one before, and apart from it by no more.
+    fn follows(&self, frame: usize, apart: f64) -> bool {
         let before = frame - 1;
         let is_above = |frame: usize| self.position_mm[frame][2] > 0.0;
         let apart_s = self.t_s[frame] - self.t_s[before];
@@ -114,10 +163,9 @@ impl Frames {
             && self.phase[frame] == self.phase[before]
             && self.indenter[frame] == self.indenter[before]
             && self.covering_mm[frame].to_bits() == self.covering_mm[before].to_bits()
-            && self.temperature_c[frame].is_nan() == self.temperature_c[before].is_nan()
             && is_above(frame) == is_above(before)
             && apart_s > 0.0
-            && apart_s <= APART * STRIDE_S
+            && apart_s <= apart * STRIDE_S
             && !begins_run()
             && !begins_part()
             && !self.is_after_gap(frame)
@@ -137,7 +185,12 @@ impl Frames {
             self.t_s[place] = mean(&|frame| self.t_s[frame]);
             self.position_mm[place] =
                 std::array::from_fn(|axis| mean(&|frame| self.position_mm[frame][axis]));
-            self.temperature_c[place] = single(mean(&|frame| f64::from(self.temperature_c[frame])));
+            let known: Vec<f64> = self.temperature_c[first..end]
+                .iter()
+                .filter(|temperature_c| !temperature_c.is_nan())
+                .map(|temperature_c| f64::from(*temperature_c))
+                .collect();
+            self.temperature_c[place] = single(known.iter().sum::<f64>() / known.len() as f64);
             for element in 0..elements {
                 let counts = mean(&|frame| f64::from(self.counts[frame * elements + element]));
                 self.counts[place * elements + element] = single(counts);

@@ -35,6 +35,13 @@ fn pushed(rate_hz: u32, presses: u32, frames_most: usize, tone: impl Fn(f64) -> 
     frames
 }
 
+/// No frame is the mean of more than one and a half times 32, and at most one in a hundred of less than half.
+fn assert_few_outside(frames: &Frames) {
+    let count = |is_outside: fn(u32) -> bool| frames.joined.iter().filter(|one| is_outside(**one)).count();
+    let [more, less] = [count(|joined| joined > 48), count(|joined| joined < 16)];
+    assert!(more == 0 && less <= frames.len() / 100, "{more} {less}");
+}
+
 fn silent(_: f64) -> f32 {
     0.0
 }
@@ -45,8 +52,8 @@ fn a_fast_sensor_is_read_at_the_pace_of_the_papers_before_presses_are_left_out()
     let frames = pushed(1000, 20, 4000, silent);
     assert_eq!((frames.given(), frames.left_out(), frames.joined()), (80_000, 0, 32));
     assert!((2400..=2600).contains(&frames.len()), "{}", frames.len());
-    // Those at the ends of a press are as well means of sixteen and more.
-    assert!(frames.joined.iter().all(|joined| (16..=48).contains(joined)), "{:?}", frames.joined);
+    // Those at the ends of a press are means of half as many and more, unless a part ends there.
+    assert_few_outside(&frames);
     // What does not change stays, and what changes evenly is that of the mean time.
     for (t_s, [x_mm, _, z_mm]) in frames.t_s.iter().zip(&frames.position_mm) {
         assert!((x_mm - t_s).abs() < 1e-9 && [-0.5, 2.0].contains(z_mm), "{t_s} {x_mm} {z_mm}");
@@ -80,7 +87,7 @@ fn of_a_longer_recording_presses_are_left_out_too() {
     let read = frames.given() - frames.left_out();
     // Of as many frames as may be read, 32 each; one press of two is left out, and one of two again.
     assert!((4000 * 16..=4000 * 32).contains(&read), "{read}");
-    assert!(frames.joined.iter().all(|joined| (16..=48).contains(joined)), "{:?}", frames.joined);
+    assert_few_outside(&frames);
 }
 
 #[test]

@@ -341,7 +341,7 @@ impl Hat {
             return 0.0;
         }
         let slope = |from: Option<f64>| from.map_or(1.0, |from| (value - from) / (self.knot - from));
-        slope(self.before).min(slope(self.after)).min(1.0)
+        slope(self.before).min(slope(self.after)).clamp(0.0, 1.0)
     }
 }
 

@@ -67,7 +67,7 @@ impl<'a> Prepared<'a> {
         let still = still(frames);
         let declared_counts = known.array.step_counts();
         let step_counts = converter.as_ref().map_or(declared_counts, |one| one.step_counts(declared_counts));
-        let step_counts = Noise::step_of_means(frames, &still, step_counts);
+        let step_counts = frames.step_of_means(step_counts);
         let (mut noise, floor) = Noise::measured(frames, &still, step_counts);
         if converter.as_ref().is_some_and(Converter::rounds) {
             // Steps so coarse round small signals the same way in every press.

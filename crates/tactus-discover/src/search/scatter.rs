@@ -93,7 +93,9 @@ impl Search<'_> {
         let mut most = Scattered { p_value: 1.0, with: "" };
         let weights = self.problem.element_weight.iter().filter(|weight| **weight > 0.0);
         let noise_counts = median(&weights.map(|weight| weight.sqrt().recip()).collect::<Vec<_>>());
-        if self.rounds || noise_counts < NOISE_STEPS * self.problem.predictor.known.array.step_counts() {
+        let predictor = &self.problem.predictor;
+        let step_counts = predictor.frames.step_of_means(predictor.known.array.step_counts());
+        if self.rounds || noise_counts < NOISE_STEPS * step_counts {
             return Ok(most);
         }
         let forms = Forms::of(self.problem, &at.parameters, &at.predicted)?;
@@ -116,8 +118,12 @@ impl Search<'_> {
     fn by_blocks(&self, at: &Fitted, forms: &Forms, with: With) -> Vec<f64> {
         let bins = self.problem.predictor.bins;
         let mut blocks = vec![0.0; bins.blocks];
+        // Means of fewer frames scatter more.
+        let shares = self.problem.predictor.frames.shares();
+        let is_short =
+            |bin: usize| shares[bins.first[bin]..bins.first[bin + 1]].iter().any(|share| *share < 0.5);
         for element in (0..bins.elements).filter(|element| self.problem.element_weight[*element] > 0.0) {
-            let mut departures = self.departures(at, forms, with, element);
+            let mut departures = self.departures(at, forms, with, &is_short, element);
             departures.sort_by_key(|of| of.count);
             for alike in departures.chunk_by(|one, next| one.count == next.count) {
                 let mean =
@@ -132,12 +138,19 @@ impl Search<'_> {
         blocks
     }
 
-    fn departures(&self, at: &Fitted, forms: &Forms, with: With, element: usize) -> Vec<Departures> {
+    fn departures(
+        &self,
+        at: &Fitted,
+        forms: &Forms,
+        with: With,
+        is_short: &impl Fn(usize) -> bool,
+        element: usize,
+    ) -> Vec<Departures> {
         let problem = self.problem;
         let (bins, frames) = (problem.predictor.bins, problem.predictor.frames);
         let (elements, last) = (bins.elements, bins.len().saturating_sub(1));
         let mut departures = Vec::new();
-        for bin in (0..bins.len()).filter(|bin| problem.train[*bin] > 0.0) {
+        for bin in (0..bins.len()).filter(|bin| problem.train[*bin] > 0.0 && !is_short(*bin)) {
             let reading = bin * elements + element;
             let count = bins.frames_in(bin);
             let (square, count) = if with.at_rest() && count >= REST_FRAMES {

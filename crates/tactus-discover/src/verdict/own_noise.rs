@@ -100,11 +100,12 @@ impl Prepared<'_> {
                 windows.push(window);
             }
         }
-        let turns = turns(frames);
+        let (turns, shares) = (turns(frames), frames.shares());
         // What a converter that is not as declared does to a moving signal is no normal noise.
         let is_smooth = |frame: usize| {
             is_fitted(frame)
                 && !turns[frame]
+                && shares[frame] >= 0.5
                 && (self.converter.is_none() || self.still[frame] >= WINDOW_FRAMES)
         };
         let is_one_run = |frame: usize| self.whole.run[frame - 1] == self.whole.run[frame + 1];

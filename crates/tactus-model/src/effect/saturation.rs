@@ -60,7 +60,7 @@ pub(super) static DEFINITION: Definition = Definition {
     make: Make::Element(|values| Box::new(Saturation { loss: Loss::of(values), counts_share: values[2] })),
 };
 
-/// A signal that loses less loses nothing: in double precision the share that is left is 1.
+/// Where `q u^knee` is less, the share that is left is 1 in double precision.
 const SHARE_LEAST: f64 = f64::EPSILON / 8.0;
 
 #[derive(Debug)]

@@ -386,7 +386,9 @@ impl Factor<'_> {
     fn at(&self, at: [f64; 2]) -> f64 {
         match self {
             Self::One(covariates) => f64::from(u8::from(!at[..*covariates].iter().any(|one| one.is_nan()))),
-            Self::Tone { .. } | Self::Curve { .. } if at.iter().any(|one| one.is_nan()) => 0.0,
+            Self::Tone { .. } | Self::Hats(_) | Self::Curve { .. } if at.iter().any(|one| one.is_nan()) => {
+                0.0
+            }
             Self::Tone { per_unit, parts: [of_sin, of_cos] } => {
                 let (sin, cos) = (std::f64::consts::TAU * per_unit * at[0]).sin_cos();
                 of_sin * sin + of_cos * cos
