@@ -319,7 +319,9 @@ fn times(values: &[f64], factors: &[f64]) -> Vec<f64> {
     let mut values = values.to_vec();
     let each = values.len() / factors.len();
     for (of_bin, factor) in values.chunks_exact_mut(each).zip(factors) {
-        of_bin.iter_mut().for_each(|value| *value *= factor);
+        for value in of_bin {
+            *value *= factor;
+        }
     }
     values
 }
