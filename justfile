@@ -334,7 +334,7 @@ discovery-glance:
 # What discovery finds in 42 sets that another program makes, which shares no code with ours: docs/discovery-evidence.md.
 discovery-independent: bench-peers-tools
     cargo build --profile dist --package tactus
-    {{ tools }}/peers/bin/python bench/independent/make.py --seed 3 --out target/evidence/independent/sets
+    {{ tools }}/peers/bin/python bench/independent/make.py --seed 4 --out target/evidence/independent/sets
     {{ tools }}/peers/bin/python bench/independent/judge.py --tactus target/dist/tactus --sets target/evidence/independent/sets \
         --out target/evidence/independent/$(sha256sum target/dist/tactus | cut -c 1-12) --document docs/discovery-evidence.md
 
