@@ -89,7 +89,8 @@
 //! | pace.rs | `APART` | `0.55` | derived | two of half a stride, and a tenth of jitter |
 //! | pace.rs | `APART_AT_END` | `0.75` | derived | a full frame and less than half of one |
 //! | pace.rs | `DITHERED_STEPS` | `0.577` | derived | root of `1 / 4 + 1 / 12`; `e^-10` of what repeats is left |
-//! | pace.rs | `IDLE_LEAST` | `256` | convention | as `FRAMES_LEAST` of a spectrum |
+//! | pace.rs | `TOLERANCE` | `0.05` | convention | a rate of 60 Hz is never exact |
+//! | pace.rs | `USUAL` | `0.25` | convention | variances that differ by a quarter count as one |
 //! | spectrum.rs | `STANDS_OUT` | `8.0` | tried | 6 at first; no recipe |
 //! | spectrum.rs | `RECORDINGS_PER_FALSE_LINE` | `50.0` | convention | one recording of noise in fifty (decision 0055) |
 //! | spectrum.rs | `PHASES_PER_COLUMN` | `2` | derived | so that no phase is more than a quarter of a turn, over all columns, from one looked at |

@@ -156,7 +156,10 @@ impl Bins {
             self.heldout[bin] = heldout.frames[frame];
             let count = self.frames_in(bin);
             let members = self.first[bin]..self.first[bin + 1];
-            let whole = shares[members].iter().sum::<f64>() / noise.inflation(count);
+            // That of a mean of frames which are means themselves.
+            let counts =
+                (count as f64).powi(2) / shares[members].iter().map(|share| share.recip()).sum::<f64>();
+            let whole = counts / noise.inflation(count);
             self.weight[bin] = if turns[frame] { 0.0 } else { whole };
             let other = self.run[bin] != self.run[began]
                 || frames.press[frame] != frames.press[start]

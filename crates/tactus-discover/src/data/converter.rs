@@ -83,11 +83,12 @@ impl Converter {
         codes.wider_steps(declared_counts).or_else(|| codes.gaps(frames, declared_counts))
     }
 
-    /// The step of the lattice on which all readings lie, if they lie on one.
+    /// The step of the lattice on which all readings lie, 0 if they lie on none. `None` if there are too few different ones to tell.
     pub(super) fn step_of(readings: &[f32]) -> Option<f64> {
         let codes = Frequencies::of(readings).counts;
         // The ends of the range need not be a whole number of steps apart from the others.
-        lattice_step(codes.get(1..codes.len().saturating_sub(1))?)
+        let inside = || codes.get(1..codes.len() - 1).and_then(lattice_step).unwrap_or(0.0);
+        (codes.len() >= READINGS_LEAST).then(inside)
     }
 
     /// True if its steps are wider than declared.

@@ -18,7 +18,7 @@ const READINGS_MOST: usize = 48 * 24_000;
 const PART_SHARE: usize = 16;
 /// Straight lines leave the way by at most so much.
 const OFF_MM: f64 = 0.02;
-/// Points of a way that are thinned out together: the time may grow with their square.
+/// Points of a way that are thinned out together where parts are as long as a fast sensor makes them: the time may grow with their square.
 const POINTS_AT_ONCE: usize = 2048;
 /// Changes the seed of each group's draw.
 const STREAM: u64 = 0x0065_7863_6572_7074;
@@ -116,7 +116,8 @@ impl Frames {
         let gap = self.way.split_off(self.way.partition_point(|point| point.before < next));
         // Where no frame of a run follows, nobody asks for its way.
         if !is_other_run {
-            self.way.extend(gap.chunks(POINTS_AT_ONCE).flat_map(|some| bends(some, OFF_MM)));
+            let at_once = if self.excerpt.each > 1 { POINTS_AT_ONCE } else { usize::MAX };
+            self.way.extend(gap.chunks(at_once).flat_map(|some| bends(some, OFF_MM)));
         }
         self.shorten_way();
         let number = self.excerpt.parts;

@@ -22,10 +22,12 @@ use super::spectrum;
 const APART: f64 = 0.55;
 /// The same of what is left at the end of a stretch: a full frame and less than half of one.
 const APART_AT_END: f64 = 0.75;
+/// The share by which usual frames may be means of more or fewer.
+const USUAL: f64 = 0.25;
 /// Noise of half a step, and the rounding beside it, in steps: it dithers so well that next to nothing of the rounding repeats.
 const DITHERED_STEPS: f64 = 0.577;
-/// Fewer frames out of contact do not show a tone.
-const IDLE_LEAST: usize = 256;
+/// Of a rate that is so much less than twice that of the paper's sensor each two frames are joined too.
+const TOLERANCE: f64 = 0.05;
 
 /// Frames of one stretch that become one.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +41,7 @@ struct Group {
 impl Frames {
     /// Joins each two frames, if that leaves enough in a second. False if none were joined.
     pub(super) fn slow_down(&mut self) -> bool {
-        if 2.0 * interval_s(self) > STRIDE_S || !self.may_be_joined() {
+        if 2.0 * interval_s(self) > (1.0 + TOLERANCE) * STRIDE_S || !self.may_be_joined() {
             return false;
         }
         let (before, each) = (self.len(), self.excerpt.each);
@@ -57,8 +59,7 @@ impl Frames {
         if let Some(known) = self.excerpt.may_be_joined {
             return known;
         }
-        let idle = self.position_mm.iter().filter(|position_mm| position_mm[2] > 0.0).count();
-        if idle < IDLE_LEAST {
+        if !spectrum::is_seen(self) {
             return false;
         }
         let may_be = self.is_without_tones() && self.is_dithered();
@@ -67,15 +68,18 @@ impl Frames {
     }
 
     fn is_without_tones(&self) -> bool {
-        let counts: Vec<f64> = self.counts.iter().map(|counts| f64::from(*counts)).collect();
+        let known = |counts: &f32| if counts.is_finite() { f64::from(*counts) } else { 0.0 };
+        let counts: Vec<f64> = self.counts.iter().map(known).collect();
         spectrum::lines(self, 1, &counts).is_empty()
             && spectrum::lines_in_contact(self, 1, &counts).is_empty()
     }
 
-    /// True if the noise moves readings by more than the step on which all of them lie.
+    /// True if the noise moves readings by half a step, where all lie on steps. False of too few different readings.
     fn is_dithered(&self) -> bool {
-        let step_counts = Converter::step_of(&self.counts).unwrap_or(0.0);
-        Noise::of_differences(self, step_counts).rms_counts >= DITHERED_STEPS * step_counts
+        let is_dithered = |step_counts: f64| {
+            Noise::of_differences(self, step_counts).rms_counts >= DITHERED_STEPS * step_counts
+        };
+        Converter::step_of(&self.counts).is_some_and(is_dithered)
     }
 
     /// Of how many frames that were given one here mostly is the mean: half of those are in frames of no more.
@@ -91,10 +95,15 @@ impl Frames {
         joined.into_iter().find(is_half).unwrap_or(1)
     }
 
-    /// For each frame, of how many frames it is the mean beside most.
+    /// For each frame, of how many frames it is the mean beside most: its inverse variance beside theirs.
     pub(crate) fn shares(&self) -> Vec<f64> {
         let usual = f64::from(self.joined());
         self.joined.iter().map(|joined| f64::from(*joined) / usual).collect()
+    }
+
+    /// For each frame, whether it is the mean of nearly as many as most.
+    pub(crate) fn are_usual(&self) -> Vec<bool> {
+        self.shares().iter().map(|share| (share - 1.0).abs() <= USUAL).collect()
     }
 
     /// The step with which the frames scatter as single readings do with the converter's own: noise dithers what is joined.
@@ -185,12 +194,12 @@ impl Frames {
             self.t_s[place] = mean(&|frame| self.t_s[frame]);
             self.position_mm[place] =
                 std::array::from_fn(|axis| mean(&|frame| self.position_mm[frame][axis]));
-            let known: Vec<f64> = self.temperature_c[first..end]
-                .iter()
-                .filter(|temperature_c| !temperature_c.is_nan())
-                .map(|temperature_c| f64::from(*temperature_c))
-                .collect();
-            self.temperature_c[place] = single(known.iter().sum::<f64>() / known.len() as f64);
+            let known = || {
+                let all = self.temperature_c[first..end].iter().zip(&shares);
+                all.filter(|(temperature_c, _)| !temperature_c.is_nan())
+            };
+            let sum: f64 = known().map(|(temperature_c, share)| f64::from(*temperature_c) * share).sum();
+            self.temperature_c[place] = single(sum / known().map(|(_, share)| share).sum::<f64>());
             for element in 0..elements {
                 let counts = mean(&|frame| f64::from(self.counts[frame * elements + element]));
                 self.counts[place * elements + element] = single(counts);

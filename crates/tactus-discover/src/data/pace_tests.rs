@@ -11,6 +11,11 @@ const ELEMENTS: usize = 16;
 
 /// Frames at this rate: presses of 2 s, and 2 s out of contact after each. All elements read a tone, each with noise of its own.
 fn pushed(rate_hz: u32, presses: u32, frames_most: usize, tone: impl Fn(f64) -> f32) -> Frames {
+    recorded(rate_hz, presses, frames_most, |t_s, noise| tone(t_s) + noise)
+}
+
+/// The same of any reading, from the time and a noise of -1 to 1.
+fn recorded(rate_hz: u32, presses: u32, frames_most: usize, reading: impl Fn(f64, f32) -> f32) -> Frames {
     let mut frames = Frames::new(ELEMENTS);
     frames.excerpt = Excerpt::of_frames(frames_most);
     let mut noise = ChaCha8Rng::seed_from_u64(5);
@@ -29,7 +34,7 @@ fn pushed(rate_hz: u32, presses: u32, frames_most: usize, tone: impl Fn(f64) -> 
             covering_mm: 1.0,
             indenter: "cyl1",
             temperature_c: None,
-            counts: &[0.0; ELEMENTS].map(|none: f32| none + tone(t_s) + noise.random_range(-1.0..1.0)),
+            counts: &[(); ELEMENTS].map(|()| reading(t_s, noise.random_range(-1.0..1.0))),
         });
     }
     frames
@@ -95,6 +100,45 @@ fn a_sensor_like_the_papers_is_read_as_it_is() {
     let frames = pushed(50, 100, 4000, silent);
     assert_eq!(frames.joined(), 1);
     assert!(frames.left_out() > 0);
+}
+
+#[test]
+fn twice_the_pace_of_the_papers_is_joined_too() {
+    assert_eq!([60, 120, 480].map(|rate_hz| pushed(rate_hz, 100, 2000, silent).joined()), [2, 4, 16]);
+}
+
+#[test]
+fn what_nothing_dithers_is_read_as_it_is() {
+    // Whole counts of what rises by eight in a second.
+    #[expect(clippy::cast_possible_truncation, reason = "counts")]
+    let slow = |t_s: f64, noise: f32| (8.0 * t_s as f32 + noise).round();
+    let frames = recorded(1000, 20, 4000, |t_s, noise| slow(t_s, 0.1 * noise));
+    assert_eq!(frames.joined(), 1);
+    let dithered = recorded(1000, 20, 4000, |t_s, noise| slow(t_s, 2.0 * noise));
+    assert_eq!(dithered.joined(), 32);
+    let constant = recorded(1000, 20, 4000, |_, _| 7.0);
+    assert_eq!(constant.joined(), 1);
+}
+
+#[test]
+fn times_that_stand_still_do_not_end_it() {
+    let mut frames = Frames::new(1);
+    frames.excerpt = Excerpt::of_frames(600);
+    for (number, t_ns) in (0..5000).zip((0..).step_by(1_000_000)) {
+        frames.push(RowView {
+            run: "a",
+            press: -1,
+            phase: Phase::Idle,
+            // The clock is set back in the middle, and stands then.
+            t_ns: if number < 300 { t_ns } else { -1 },
+            position_mm: [0.0, 0.0, 2.0],
+            covering_mm: 1.0,
+            indenter: "cyl1",
+            temperature_c: None,
+            counts: &[0.0],
+        });
+    }
+    assert_eq!((frames.given(), frames.joined()), (5000, 1));
 }
 
 #[test]

@@ -53,6 +53,11 @@ struct Peak {
     line: Line,
 }
 
+/// True if there are enough frames without contact for a spectrum.
+pub(super) fn is_seen(frames: &Frames) -> bool {
+    Chosen::of(frames, |frame| frames.position_mm[frame][2] > 0.0).is_some()
+}
+
 /// Lines in the residual of the frames without contact, clearest first.
 ///
 /// `residual`: frame by frame, element by element, of an array with so many columns.
@@ -146,7 +151,8 @@ impl Chosen {
         let size = (slot(end - 1) + 1).next_power_of_two().min(1 << 18);
         let chosen: Vec<usize> =
             (begin..end).filter(|frame| slot(*frame) < size && is_chosen(*frame)).collect();
-        if chosen.len() < FRAMES_LEAST {
+        // Times that stand still or run back have few slots.
+        if chosen.len().min(size) < FRAMES_LEAST {
             return None;
         }
         let step_hz = 1.0 / (size as f64 * interval_s);

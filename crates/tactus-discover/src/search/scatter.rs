@@ -119,11 +119,11 @@ impl Search<'_> {
         let bins = self.problem.predictor.bins;
         let mut blocks = vec![0.0; bins.blocks];
         // Means of fewer frames scatter more.
-        let shares = self.problem.predictor.frames.shares();
-        let is_short =
-            |bin: usize| shares[bins.first[bin]..bins.first[bin + 1]].iter().any(|share| *share < 0.5);
+        let are_usual = self.problem.predictor.frames.are_usual();
+        let is_usual =
+            |bin: usize| are_usual[bins.first[bin]..bins.first[bin + 1]].iter().all(|usual| *usual);
         for element in (0..bins.elements).filter(|element| self.problem.element_weight[*element] > 0.0) {
-            let mut departures = self.departures(at, forms, with, &is_short, element);
+            let mut departures = self.departures(at, forms, with, &is_usual, element);
             departures.sort_by_key(|of| of.count);
             for alike in departures.chunk_by(|one, next| one.count == next.count) {
                 let mean =
@@ -143,14 +143,14 @@ impl Search<'_> {
         at: &Fitted,
         forms: &Forms,
         with: With,
-        is_short: &impl Fn(usize) -> bool,
+        is_usual: &impl Fn(usize) -> bool,
         element: usize,
     ) -> Vec<Departures> {
         let problem = self.problem;
         let (bins, frames) = (problem.predictor.bins, problem.predictor.frames);
         let (elements, last) = (bins.elements, bins.len().saturating_sub(1));
         let mut departures = Vec::new();
-        for bin in (0..bins.len()).filter(|bin| problem.train[*bin] > 0.0 && !is_short(*bin)) {
+        for bin in (0..bins.len()).filter(|bin| problem.train[*bin] > 0.0 && is_usual(*bin)) {
             let reading = bin * elements + element;
             let count = bins.frames_in(bin);
             let (square, count) = if with.at_rest() && count >= REST_FRAMES {

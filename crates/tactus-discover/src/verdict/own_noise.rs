@@ -89,9 +89,12 @@ impl Prepared<'_> {
     pub(super) fn own_noise(&self, of: &Residual) -> Scattered {
         let (frames, elements) = (self.frames, self.frames.elements);
         let is_fitted = |frame: usize| !self.heldout.frames[frame];
+        // Means of fewer frames scatter more.
+        let are_usual = frames.are_usual();
         // A window begins as long after the tip came to rest as it lasts.
         let is_window = |window: &Range<usize>| {
-            self.still[window.end - 1] >= 2 * WINDOW_FRAMES - 1 && window.clone().all(is_fitted)
+            self.still[window.end - 1] >= 2 * WINDOW_FRAMES - 1
+                && window.clone().all(|frame| is_fitted(frame) && are_usual[frame])
         };
         let mut windows: Vec<Range<usize>> = Vec::new();
         for end in WINDOW_FRAMES..=frames.len() {
@@ -100,12 +103,12 @@ impl Prepared<'_> {
                 windows.push(window);
             }
         }
-        let (turns, shares) = (turns(frames), frames.shares());
+        let turns = turns(frames);
         // What a converter that is not as declared does to a moving signal is no normal noise.
         let is_smooth = |frame: usize| {
             is_fitted(frame)
                 && !turns[frame]
-                && shares[frame] >= 0.5
+                && are_usual[frame]
                 && (self.converter.is_none() || self.still[frame] >= WINDOW_FRAMES)
         };
         let is_one_run = |frame: usize| self.whole.run[frame - 1] == self.whole.run[frame + 1];
