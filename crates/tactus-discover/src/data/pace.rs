@@ -84,6 +84,9 @@ impl Frames {
 
     /// Of how many frames that were given one here mostly is the mean: half of those are in frames of no more.
     pub fn joined(&self) -> u32 {
+        if self.excerpt.each == 1 {
+            return 1;
+        }
         let mut joined = self.joined.clone();
         joined.sort_unstable();
         let all: u64 = joined.iter().map(|joined| u64::from(*joined)).sum();
@@ -118,7 +121,10 @@ impl Frames {
             return;
         }
         for (place, group) in (from..).zip(&groups) {
-            self.become_one(place, *group);
+            // Those before the first that is joined stay where they are.
+            if group.end > place + 1 {
+                self.become_one(place, *group);
+            }
         }
         let count = from + groups.len();
         // The new place of a frame that begins a group, or of the end.
@@ -190,25 +196,17 @@ impl Frames {
         };
         #[expect(clippy::cast_possible_truncation, reason = "as precise as a reading")]
         let single = |value: f64| value as f32;
-        if end > first + 1 {
-            self.t_s[place] = mean(&|frame| self.t_s[frame]);
-            self.position_mm[place] =
-                std::array::from_fn(|axis| mean(&|frame| self.position_mm[frame][axis]));
-            let known = || {
-                let all = self.temperature_c[first..end].iter().zip(&shares);
-                all.filter(|(temperature_c, _)| !temperature_c.is_nan())
-            };
-            let sum: f64 = known().map(|(temperature_c, share)| f64::from(*temperature_c) * share).sum();
-            self.temperature_c[place] = single(sum / known().map(|(_, share)| share).sum::<f64>());
-            for element in 0..elements {
-                let counts = mean(&|frame| f64::from(self.counts[frame * elements + element]));
-                self.counts[place * elements + element] = single(counts);
-            }
-        } else {
-            self.t_s[place] = self.t_s[first];
-            self.position_mm[place] = self.position_mm[first];
-            self.temperature_c[place] = self.temperature_c[first];
-            self.counts.copy_within(first * elements..end * elements, place * elements);
+        self.t_s[place] = mean(&|frame| self.t_s[frame]);
+        self.position_mm[place] = std::array::from_fn(|axis| mean(&|frame| self.position_mm[frame][axis]));
+        let known = || {
+            let all = self.temperature_c[first..end].iter().zip(&shares);
+            all.filter(|(temperature_c, _)| !temperature_c.is_nan())
+        };
+        let sum: f64 = known().map(|(temperature_c, share)| f64::from(*temperature_c) * share).sum();
+        self.temperature_c[place] = single(sum / known().map(|(_, share)| share).sum::<f64>());
+        for element in 0..elements {
+            let counts = mean(&|frame| f64::from(self.counts[frame * elements + element]));
+            self.counts[place * elements + element] = single(counts);
         }
         self.number[place] = self.number[first];
         self.press[place] = self.press[first];

@@ -1,6 +1,6 @@
 //! Sums of products over bins of one segment, tile by tile.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Scalar};
 
 /// Directions whose products are computed together.
 const PANEL: usize = 128;
@@ -156,13 +156,21 @@ impl Border {
 
     /// Adds that of some directions.
     pub(super) fn add_of(&mut self, active: &[usize], other: &Self) {
-        let pairs = [(&mut self.by_baseline, &other.by_baseline), (&mut self.by_gain, &other.by_gain)];
-        for (to, of) in pairs {
-            for (number, of) in active.iter().zip(of.column_iter()) {
-                to.column_mut(*number).zip_apply(&of, |to, of| *to += of);
-            }
-        }
+        add_columns(&mut self.by_baseline, active, &other.by_baseline, |to, of| *to += of);
+        add_columns(&mut self.by_gain, active, &other.by_gain, |to, of| *to += of);
         add(&mut self.own, &other.own);
+    }
+}
+
+/// Adds to the columns of some directions those of a matrix that has these alone.
+pub(super) fn add_columns<T: Scalar>(
+    to: &mut DMatrix<T>,
+    active: &[usize],
+    of: &DMatrix<f64>,
+    add: impl Fn(&mut T, f64),
+) {
+    for (number, of) in active.iter().zip(of.column_iter()) {
+        to.column_mut(*number).zip_apply(&of, &add);
     }
 }
 

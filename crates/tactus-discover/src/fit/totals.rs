@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::parameters::Parameters;
 use super::problem::Problem;
 use super::random_walk::is_random_walk;
-use super::tiles::{Border, Sums, add};
+use super::tiles::{Border, Sums, add, add_columns};
 
 /// Which products a pass keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,12 +121,8 @@ impl Block {
         for (place, number) in active.iter().enumerate() {
             self.diagonal[*number] += single(products[(place, place)]);
         }
-        let pairs = [(&mut self.by_baseline, &border.by_baseline), (&mut self.by_gain, &border.by_gain)];
-        for (to, of) in pairs {
-            for (number, of) in active.iter().zip(of.column_iter()) {
-                to.column_mut(*number).zip_apply(&of, |to, of| *to += single(of));
-            }
-        }
+        add_columns(&mut self.by_baseline, active, &border.by_baseline, |to, of| *to += single(of));
+        add_columns(&mut self.by_gain, active, &border.by_gain, |to, of| *to += single(of));
         add(&mut self.own, &border.own);
     }
 }

@@ -348,12 +348,12 @@ fn straightened(linear: f64, quadratic_per_mm: f64) -> f64 {
 
 /// What an atom, or a part of it, multiplies its carrier by.
 enum Factor<'a> {
-    /// 1 wherever the covariates have values: so many of them.
-    One(usize),
+    /// 1 wherever the covariates have values.
+    One,
     /// Of a tone, sine and cosine.
     Tone { per_unit: f64, parts: [f64; 2] },
     /// The hats of a knot of each covariate.
-    Hats([Option<Hat>; 2]),
+    Hats(Hat, Option<Hat>),
     /// A curve through its knots, and for two covariates a table.
     Curve { knots: &'a [Vec<f64>], values: &'a [f64] },
 }
@@ -365,36 +365,35 @@ impl Atom {
             let parts = match (part, &self.curve) {
                 (Some(part), _) => std::array::from_fn(|one| f64::from(u8::from(one == part))),
                 (None, Some(curve)) => [curve[0], curve[1]],
-                (None, None) => return Factor::One(self.covariates.len()),
+                (None, None) => return Factor::One,
             };
             return Factor::Tone { per_unit, parts };
         }
         match (part, self.knots.as_slice(), &self.curve) {
-            (Some(knot), [only], _) => Factor::Hats([Some(Hat::of(only, knot)), None]),
-            (Some(knot), [first, second], _) => Factor::Hats([
-                Some(Hat::of(first, knot / second.len())),
-                Some(Hat::of(second, knot % second.len())),
-            ]),
+            (Some(knot), [only], _) => Factor::Hats(Hat::of(only, knot), None),
+            (Some(knot), [first, second], _) => {
+                Factor::Hats(Hat::of(first, knot / second.len()), Some(Hat::of(second, knot % second.len())))
+            }
             (None, knots @ ([_] | [_, _]), Some(curve)) => Factor::Curve { knots, values: curve },
-            _ => Factor::One(self.covariates.len()),
+            _ => Factor::One,
         }
     }
 }
 
 impl Factor<'_> {
-    /// Its value at those of the covariates; 0 where one has none.
+    /// Its value at those of the covariates; 0 where one has none. The second is 0 where there is only one covariate.
     fn at(&self, at: [f64; 2]) -> f64 {
+        if at.iter().any(|one| one.is_nan()) {
+            return 0.0;
+        }
         match self {
-            Self::One(covariates) => f64::from(u8::from(!at[..*covariates].iter().any(|one| one.is_nan()))),
-            Self::Tone { .. } | Self::Hats(_) | Self::Curve { .. } if at.iter().any(|one| one.is_nan()) => {
-                0.0
-            }
+            Self::One => 1.0,
             Self::Tone { per_unit, parts: [of_sin, of_cos] } => {
                 let (sin, cos) = (std::f64::consts::TAU * per_unit * at[0]).sin_cos();
                 of_sin * sin + of_cos * cos
             }
-            Self::Hats([first, second]) => {
-                let of_first = first.map_or(1.0, |hat| hat.at(at[0]));
+            Self::Hats(first, second) => {
+                let of_first = first.at(at[0]);
                 if of_first == 0.0 { 0.0 } else { of_first * second.map_or(1.0, |hat| hat.at(at[1])) }
             }
             Self::Curve { knots, values } => match knots {
