@@ -39,6 +39,7 @@ mod denial;
 mod endpoint;
 mod error;
 mod lease;
+mod linger;
 mod listener;
 mod liveness;
 mod merge;

@@ -19,6 +19,7 @@ use crate::{
     command::{self, PendingReplies, Replies},
     denial,
     error::of_zenoh,
+    linger,
     outlet::Carrier,
     queue::Queue,
     stop::StopSocket,
@@ -144,13 +145,14 @@ impl Node {
         denied
     }
 
-    /// Sends all waiting messages and replies, then closes.
+    /// Sends all waiting messages and replies, waits until the clients have taken them or for 5 s, then closes.
     pub(crate) async fn close(self) -> Result<(), BusError> {
         for carrier in self.carriers {
             carrier.finish().await;
         }
         self.command_replies.finish().await;
         self.history_replies.finish().await;
+        linger::until_taken(&self.session).await;
         self.session.close().await.map_err(|source| BusError::Close { source: of_zenoh(&source) })
     }
 }

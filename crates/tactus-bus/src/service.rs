@@ -104,8 +104,8 @@ impl Bus {
         AliveToken::declare(&self.node.session, &self.keys).await
     }
 
-    /// Sends all waiting messages, then takes the rig off the bus. The last one that uses a [`Node`] closes it. Drop the [`AliveToken`]
-    /// before, so that clients learn of it first.
+    /// Sends all waiting messages, then takes the rig off the bus. The last one that uses a [`Node`] closes it, once the clients have
+    /// taken the messages or after 5 s. Drop the [`AliveToken`] before, so that clients learn of it first.
     ///
     /// # Errors
     /// [`BusError::Close`] if zenoh could not close the session cleanly.
