@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{Process, ServiceUnderTest, changed, free_endpoint, repository, tactus, until};
+use tactus_e2e::{Process, ServiceUnderTest, free_endpoint, repository, tactus, until};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb::{self, run_event::Event};
 
@@ -54,8 +54,7 @@ fn truth(lab: &mut ServiceUnderTest) -> Value {
 
 #[test]
 fn a_run_started_by_the_cli_is_done_and_recorded() {
-    // A busy machine may need longer than three periods of the shipped rate for a frame, which is a safety stop.
-    let lab = ServiceUnderTest::start(|rig| changed(rig, &[("rate_hz = 30.0", "rate_hz = 10.0")]));
+    let lab = ServiceUnderTest::start(|rig| rig);
     let script = lab.script("presses.star", PRESSES);
     let said = lab.tactus(&["--json", "run", &script]);
     assert_eq!(said.code, Some(0), "{said:?}");
@@ -151,7 +150,7 @@ fn sigterm_in_the_middle_of_a_press_retracts_and_closes_the_recording() {
 }
 
 #[test]
-fn a_sensor_that_goes_for_two_seconds_is_a_gap_of_sixty_frames_and_the_press_is_repeated() {
+fn a_sensor_that_goes_for_two_seconds_is_a_gap_of_twenty_frames_and_the_press_is_repeated() {
     let mut lab = ServiceUnderTest::start(|rig| rig);
     let script = lab.script("long.star", LONG_DWELL);
     let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
@@ -167,8 +166,8 @@ fn a_sensor_that_goes_for_two_seconds_is_a_gap_of_sixty_frames_and_the_press_is_
         .filter_map(|event| if let Event::Gap(gap) = event { Some(gap) } else { None })
         .collect();
     assert_eq!(gaps.len(), 1, "{gaps:?}");
-    // Two seconds without the device, and the time for the driver to find it again.
-    assert!((59..=110).contains(&gaps[0].frames_lost), "{gaps:?}");
+    // Two seconds without the device, at 10 Hz, and the time for the driver to find it again.
+    assert!((19..=37).contains(&gaps[0].frames_lost), "{gaps:?}");
     assert_eq!(gaps[0].next_seq - gaps[0].after_seq - 1, gaps[0].frames_lost);
     assert!(events.iter().any(|event| matches!(event, Event::PressRepeated(_))));
     let Some(Event::Finished(finished)) = events.last() else { panic!("{events:?}") };

@@ -448,7 +448,8 @@ pub struct ServiceUnderTest {
 }
 
 impl ServiceUnderTest {
-    /// Starts both, waits until frames flow, and resets, so that runs can start. `change` may rewrite the rig file.
+    /// Starts both, waits until frames flow, and resets, so that runs can start. `change` may rewrite the rig file, the shipped one with a
+    /// sensor of 10 Hz.
     ///
     /// # Panics
     /// If one of them does not start.
@@ -493,7 +494,8 @@ impl ServiceUnderTest {
     ) -> Self {
         let folder = TempDir::new().expect("a folder");
         let rig = fs::read_to_string(repository("config/rigs/pty.toml")).expect("the shipped rig");
-        fs::write(folder.path().join("rig.toml"), change(rig)).expect("a writable folder");
+        let rig = change(changed(rig, &[UNHURRIED]));
+        fs::write(folder.path().join("rig.toml"), rig).expect("a writable folder");
         let endpoint = free_endpoint();
         let config = format!("rig = \"rig.toml\"\nrecordings = \"runs\"\n[bus]\nlisten = [\"{endpoint}\"]\n");
         fs::write(folder.path().join("tactusd.toml"), config).expect("a writable folder");
@@ -589,6 +591,10 @@ const FIRST_PORT: u32 = 10_000;
 /// Number of ports from it, all below those that Linux gives to connections.
 const PORTS: u32 = 22_000;
 
+/// A slow sensor for the shipped rig: a busy machine may need longer than three periods of the shipped rate for a frame, which is a
+/// safety stop.
+const UNHURRIED: (&str, &str) = ("rate_hz = 30.0", "rate_hz = 10.0");
+
 /// The shipped rig with little travel, so that homing and ways are short, and a slow sensor.
 ///
 /// # Panics
@@ -599,8 +605,7 @@ pub fn small_rig() -> String {
         ("x_mm = [10.0, 50.0]", "x_mm = [18.0, 32.0]"),
         ("y_mm = [10.0, 40.0]", "y_mm = [13.0, 27.0]"),
         ("z_max_mm = 30.0", "z_max_mm = 4.0"),
-        // A busy machine may need longer than three periods of the shipped rate for a frame, which is a safety stop.
-        ("rate_hz = 30.0", "rate_hz = 10.0"),
+        UNHURRIED,
         ("[[0.0, 60.0], [0.0, 50.0], [-6.0, 30.0]]", "[[18.0, 32.0], [13.0, 27.0], [-6.0, 4.0]]"),
     ];
     changed(rig, &changes)
