@@ -5,7 +5,7 @@
 //! ```
 //!
 //! [`predictor`] computes the prediction with the pipeline of `tactus-model`. One pass over the data gives the [`sums`] of products of all
-//! derivatives; [`elimination`] takes off what [`gains`] and baselines fit, where baselines may follow a [`random_walk`]; [`grams`] are what
+//! derivatives, of which some are [`sparse`]; [`elimination`] takes off what [`gains`] and baselines fit, where baselines may follow a [`random_walk`]; [`grams`] are what
 //! is left. [`problem`] takes damped Gauss-Newton steps in the spread and in the parameters of the
 //! effects, each on its own [`scale`]; [`knots`] of free curves stay within their class. [`folds`] measures a model on fitted presses that
 //! its parameters have not seen, [`heldout`] on those that were not fitted, and [`estimates`] says how far it is
@@ -14,7 +14,7 @@
 //! # Sources
 //! Methods that others have published name them in their file: [`elimination`], [`folds`], [`knots`], [`problem`], [`random_walk`]. What
 //! [`estimates`] computes is the variance of a prediction of linear least squares, as in any textbook. The rest is ours, and mostly
-//! bookkeeping: `gains`, [`grams`], [`heldout`], `parameters`, [`predictor`], [`prepare`], [`scale`], [`sums`], `tiles`, `totals`.
+//! bookkeeping: `gains`, [`grams`], [`heldout`], `parameters`, [`predictor`], [`prepare`], [`scale`], [`sparse`], [`sums`], `tiles`, `totals`.
 //!
 //! # Constants
 //!
@@ -67,6 +67,7 @@
 //! | scale.rs | `STEP` | `1e-3` | convention | small beside a range, large beside its rounding |
 //! | scale.rs | `LOG_STRIDE_MAX` | `1.5` | convention | a factor of 4.5 in a step |
 //! | scale.rs | `STRIDE_MAX` | `0.25` | convention | a quarter of the range |
+//! | sparse.rs | `FEW_MAX` | `4` | derived | two knots around a value, of two covariates |
 //! | sums.rs | `CHUNK_BINS` | `[64, 256]` | cost | the memory of columns |
 //! | sums.rs | `CHUNK_COLUMNS` | `32_768` | cost | the same |
 //! | sums.rs | `TILE_BINS` | `4` | cost | the cache of a processor |
@@ -87,6 +88,7 @@ mod prepare;
 mod problem;
 mod random_walk;
 mod scale;
+mod sparse;
 mod sums;
 mod tiles;
 mod totals;
@@ -101,4 +103,5 @@ pub(crate) use prepare::Prepared;
 pub(crate) use problem::{Fitted, Free, Problem, undone};
 pub use random_walk::RunWalks;
 pub(crate) use random_walk::{RANDOM_WALK, RandomWalk, is_random_walk};
+pub(crate) use sparse::{Few, Sparse};
 pub(crate) use sums::{BLOCKS_MAX, Direction};

@@ -4,13 +4,15 @@
 //! model's own parameters fit. A step of a fit, the odds of any set of additions, and tests that flip the signs of blocks follow
 //! without the data.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::elimination::{Elimination, Parts};
 use super::folds::FOLDS;
 use super::parameters::Parameters;
 use super::problem::{Fitted, Problem};
-use super::sums::{Direction, with_more_gain};
+use super::sums::{Direction, Directions, with_more_gain};
 use super::totals::{Kept, Segments};
 use crate::data::DiscoverError;
 
@@ -26,29 +28,42 @@ pub(crate) struct Grams {
 }
 
 impl Problem<'_> {
-    /// The products of directions at a fitted model.
-    pub(crate) fn grams(&self, at: &Fitted, directions: Vec<Direction<'_>>) -> Result<Grams, DiscoverError> {
-        self.products(at, directions, Kept::AllAndBlocks)
+    /// The products of directions at a fitted model. Those of the sparse columns of two groups are 0, but for those with the first group.
+    pub(crate) fn grams<'a>(
+        &self,
+        at: &Fitted,
+        directions: impl Into<Directions<'a>>,
+    ) -> Result<Grams, DiscoverError> {
+        self.products(at, directions.into(), Kept::AllAndBlocks)
     }
 
     /// As [`Self::grams`], without the products of two of the directions, which are 0: for tests of each by itself.
-    pub(crate) fn grams_of_each(
+    pub(crate) fn grams_of_each<'a>(
         &self,
         at: &Fitted,
-        directions: Vec<Direction<'_>>,
+        directions: impl Into<Directions<'a>>,
     ) -> Result<Grams, DiscoverError> {
-        self.products(at, directions, Kept::OwnAndBlocks)
+        self.products(at, directions.into(), Kept::OwnAndBlocks)
     }
 
     fn products(
         &self,
         at: &Fitted,
-        directions: Vec<Direction<'_>>,
+        Directions { each, sparse }: Directions<'_>,
         kept: Kept,
     ) -> Result<Grams, DiscoverError> {
         let mut all = self.own(&at.parameters);
-        let own = all.len();
-        all.extend(directions.into_iter().map(|direction| direction.after(own)));
+        let (own, mut end) = (all.len(), each.len());
+        all.extend(each.into_iter().map(|direction| direction.after(own)));
+        let groups: Vec<Range<usize>> = sparse
+            .iter()
+            .map(|of| {
+                let first = end;
+                end += of.columns;
+                first..end
+            })
+            .collect();
+        let all = Directions { each: all, sparse };
         let segments = Segments::of(self, &at.parameters);
         let total = self.sums(&at.parameters, &at.predicted, all, own, kept, &segments)?;
         let mut elimination = Elimination::of(self, &total, &segments, &at.parameters);
@@ -61,6 +76,13 @@ impl Problem<'_> {
                 reduced.view_mut((0, one), (one, 1)).fill(0.0);
                 reduced.view_mut((one + 1, one), (left - 2 - one, 1)).fill(0.0);
                 reduced[(one, left - 1)] = reduced[(left - 1, one)];
+            }
+        }
+        for [one, other] in
+            groups.iter().skip(1).flat_map(|one| groups.iter().skip(1).map(move |other| [one, other]))
+        {
+            if one != other {
+                reduced.view_mut((one.start, other.start), (one.len(), other.len())).fill(0.0);
             }
         }
         let fold = self.press_of_blocks(&total.blocks).into_iter().map(|press| press % FOLDS).collect();

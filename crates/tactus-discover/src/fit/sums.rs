@@ -19,7 +19,8 @@ use nalgebra::DMatrix;
 use super::parameters::Parameters;
 use super::predictor::{Reached, Stream};
 use super::problem::Problem;
-use super::tiles::{Alone, Border, Readings, Sums};
+use super::sparse::{Few, Sparse, SparseChunk};
+use super::tiles::{Alone, Border, Crossed, Readings, Sums};
 use super::totals::{Kept, Segments, Total};
 use crate::data::DiscoverError;
 use crate::numbers::parallel;
@@ -47,6 +48,26 @@ pub(crate) enum Direction<'a> {
     Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
     /// Values of any bins at one element, bin by bin; 0 at all others.
     OfElement(usize, Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
+}
+
+/// The directions of a pass, in the order of their numbers.
+pub(crate) struct Directions<'a> {
+    /// Those that are computed each by itself; beside sparse columns, those of a model's own parameters alone.
+    pub(super) each: Vec<Direction<'a>>,
+    /// Groups of sparse columns. Products of two groups are not computed, but for those with the first one.
+    pub(super) sparse: Vec<Sparse<'a>>,
+}
+
+impl<'a> From<Vec<Direction<'a>>> for Directions<'a> {
+    fn from(each: Vec<Direction<'a>>) -> Self {
+        Self { each, sparse: Vec::new() }
+    }
+}
+
+impl<'a> From<Vec<Sparse<'a>>> for Directions<'a> {
+    fn from(sparse: Vec<Sparse<'a>>) -> Self {
+        Self { each: Vec::new(), sparse }
+    }
 }
 
 impl<'a> Direction<'a> {
@@ -99,7 +120,15 @@ enum Running<'a> {
 struct Chunk {
     bins: Range<usize>,
     columns: Vec<Column>,
+    sparse: Vec<SparseChunk>,
     by_gain: Vec<f64>,
+}
+
+/// The sums over the bins of a chunk: of each part of a block, with the block's number and the part's first bin; and those of sparse columns with
+/// each other.
+struct Summed {
+    parts: Vec<(usize, usize, Sums)>,
+    crossed: Vec<Crossed>,
 }
 
 /// A direction's values at the bins of a chunk.
@@ -112,43 +141,50 @@ enum Column {
 
 impl Problem<'_> {
     /// Sums over all data at a model, of which the first `own` directions are its own.
-    pub(super) fn sums(
+    pub(super) fn sums<'a>(
         &self,
         at: &Parameters,
         predicted: &[f64],
-        directions: Vec<Direction<'_>>,
+        directions: impl Into<Directions<'a>>,
         own: usize,
         kept: Kept,
         segments: &Segments,
     ) -> Result<Total, DiscoverError> {
+        let Directions { each, sparse } = directions.into();
         let bins = self.predictor.bins;
         let standing = self.standing(at, predicted);
         let joined = bins.blocks.div_ceil(BLOCKS_MAX).max(1);
-        let count = directions.len() + 1;
-        let mut total = Total::new(count, bins.elements, segments.run.len());
+        let count = each.len() + 1;
+        let all = count + sparse.iter().map(|of| of.columns).sum::<usize>();
+        let mut total = Total::new(all, bins.elements, segments.run.len());
         let mut running: Vec<Running<'_>> =
-            directions.into_iter().map(|one| self.running(one, at)).collect::<Result<_, DiscoverError>>()?;
+            each.into_iter().map(|one| self.running(one, at)).collect::<Result<_, DiscoverError>>()?;
         let (parameters, step) = with_more_gain(at);
         running.push(self.running(Direction::Towards { parameters, step, factor: None }, at)?);
         let mut trunk = self.predictor.stream(at.clone())?;
         let pivots = if kept == Kept::OwnAndBlocks { own } else { count };
         let [least, most] = CHUNK_BINS;
-        let chunk_bins = (CHUNK_COLUMNS / count).clamp(least, most);
+        let held = count + size_of::<Few>() / size_of::<f64>() * sparse.len();
+        let chunk_bins = (CHUNK_COLUMNS / held).clamp(least, most);
         let chunks =
             (0..bins.len()).step_by(chunk_bins).map(|first| first..(first + chunk_bins).min(bins.len()));
         let mut computed: Option<Chunk> = None;
         // The products of a chunk are summed while the next one is computed.
         for range in chunks.map(Some).chain([None]) {
             let (next, summed) = rayon::join(
-                || range.map(|range| self.chunk(range, &running, &mut trunk, predicted)).transpose(),
+                || range.map(|range| self.chunk(range, &running, &sparse, &mut trunk, predicted)).transpose(),
                 || {
-                    computed
-                        .as_ref()
-                        .map(|chunk| self.sums_of_chunk(chunk, &standing, segments, joined, pivots))
+                    computed.as_ref().map(|chunk| Summed {
+                        parts: self.sums_of_chunk(chunk, &standing, segments, joined, pivots),
+                        crossed: if pivots == count { self.crossed(chunk) } else { Vec::new() },
+                    })
                 },
             );
-            for (number, first_bin, sums) in summed.into_iter().flatten() {
-                total.add(number, first_bin, own, &sums, kept);
+            if let Some(Summed { parts, crossed }) = summed {
+                for (number, first_bin, sums) in parts {
+                    total.add(number, first_bin, own, &sums, kept);
+                }
+                crossed.iter().for_each(|crossed| total.add_crossed(crossed));
             }
             computed = next?;
         }
@@ -160,6 +196,7 @@ impl Problem<'_> {
         &self,
         range: Range<usize>,
         running: &[Running<'_>],
+        sparse: &[Sparse<'_>],
         trunk: &mut Stream<'_>,
         predicted: &[f64],
     ) -> Result<Chunk, DiscoverError> {
@@ -187,7 +224,34 @@ impl Problem<'_> {
                 Column::Every(values)
             }
         };
-        Ok(Chunk { columns: values.into_iter().zip(running).map(column).collect(), bins: range, by_gain })
+        let columns: Vec<Column> = values.into_iter().zip(running).map(column).collect();
+        let mut first = columns.len();
+        let of_group = |(of, acting): (&Sparse<'_>, Vec<Few>)| {
+            let group = SparseChunk { first, columns: of.columns, acting };
+            first += of.columns;
+            group
+        };
+        let acting = parallel::map(sparse, |of| (of.acting)(range.clone()));
+        let sparse = sparse.iter().zip(acting).map(of_group).collect();
+        Ok(Chunk { columns, sparse, bins: range, by_gain })
+    }
+
+    /// Products of the columns of each sparse group of a chunk with each other, and with those of the first group.
+    fn crossed(&self, chunk: &Chunk) -> Vec<Crossed> {
+        let elements = self.predictor.bins.elements;
+        let weights = || {
+            let used = chunk.bins.clone().filter(|bin| self.train[*bin] > 0.0);
+            used.flat_map(|bin| {
+                let first = (bin - chunk.bins.start) * elements;
+                let weight =
+                    move |(element, weight): (usize, &f64)| (first + element, self.train[bin] * weight);
+                self.element_weight.iter().enumerate().map(weight)
+            })
+        };
+        let groups = chunk.sparse.len();
+        let pairs: Vec<[usize; 2]> =
+            (0..groups).map(|one| [one, one]).chain((1..groups).map(|one| [0, one])).collect();
+        parallel::map(&pairs, |pair| Crossed::of(pair.map(|one| &chunk.sparse[one]), weights()))
     }
 
     /// Sums over each part of a chunk that belongs to one block and one segment, with the block's number and the part's first bin.
@@ -246,6 +310,7 @@ impl Problem<'_> {
     ) -> Sums {
         let elements = self.predictor.bins.elements;
         let count = chunk.columns.len() + 1;
+        let residual = chunk.sparse.last().map_or(count - 1, |last| last.numbers().end);
         let weighed: Vec<usize> =
             (0..elements).filter(|element| self.element_weight[*element] > 0.0).collect();
         let per_bin = weighed.len();
@@ -268,11 +333,16 @@ impl Problem<'_> {
         let of_one = chunk.of_one(part, &weighed);
         let first = of_all.iter().take_while(|number| **number < pivots).count();
         let has_residual = of_all.last() == Some(&(count - 1));
-        let active: Vec<usize> =
-            of_all.iter().copied().chain(of_one.iter().map(|alone| alone.number)).collect();
+        let (sparse, places) = chunk.acting(part, &weighed, of_all.len() + of_one.len());
+        let number = |number: &usize| if *number == count - 1 { residual } else { *number };
+        let mut active: Vec<usize> =
+            of_all.iter().map(number).chain(of_one.iter().map(|alone| alone.number)).collect();
+        let rows = active.len();
+        active.extend(&sparse);
         let mut sums = Sums {
             segment: segments.of_bin[part[0]],
-            products: DMatrix::zeros(active.len(), active.len()),
+            products: DMatrix::zeros(rows, active.len()),
+            squares: vec![0.0; sparse.len()],
             border: Border::new(active.len(), elements),
             active,
         };
@@ -306,10 +376,11 @@ impl Problem<'_> {
             let readings =
                 Readings { bins, first_bin: chunk.bins.start, per_bin, roots: &roots, gains: &gains };
             sums.take_alone(&readings, &tile, first, has_residual, &of_one, pivots == count);
+            sums.take_sparse(&readings, &tile, &chunk.sparse, [&weighed, &places]);
             values = tile.data.into();
         }
         // What is the same below the diagonal.
-        sums.products.fill_lower_triangle_with_upper_triangle();
+        sums.products.view_mut((0, 0), (rows, rows)).fill_lower_triangle_with_upper_triangle();
         sums
     }
 }
@@ -357,6 +428,33 @@ impl Running<'_> {
 }
 
 impl Chunk {
+    /// The sparse columns that act in some bins; and for each one its place among them, after so many other directions.
+    fn acting(&self, bins: &[usize], weighed: &[usize], others: usize) -> (Vec<usize>, Vec<usize>) {
+        let (Some(first), Some(last)) = (self.sparse.first(), self.sparse.last()) else {
+            return (Vec::new(), Vec::new());
+        };
+        let elements = first.acting.len() / self.bins.len();
+        let mut acts = vec![false; last.numbers().end - first.first];
+        for group in &self.sparse {
+            let of_group = &mut acts[group.first - first.first..];
+            for bin in bins {
+                let of_bin = &group.acting[(bin - self.bins.start) * elements..];
+                let each = weighed.iter().flat_map(|element| of_bin[*element].each());
+                each.for_each(|(column, _)| of_group[column] = true);
+            }
+        }
+        let mut active = Vec::new();
+        let place = |(column, acts): (usize, bool)| {
+            let place = others + active.len();
+            if acts {
+                active.push(first.first + column);
+            }
+            place
+        };
+        let places = acts.into_iter().enumerate().map(place).collect();
+        (active, places)
+    }
+
     /// The directions of one element each that do something in some bins.
     fn of_one(&self, bins: &[usize], weighed: &[usize]) -> Vec<Alone<'_>> {
         let mut found = Vec::new();

@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, Scalar};
 
+use super::sparse::SparseChunk;
+
 /// Directions whose products are computed together.
 const PANEL: usize = 128;
 
@@ -18,10 +20,12 @@ pub(super) struct Border {
 /// Sums over bins of one segment.
 pub(super) struct Sums {
     pub(super) segment: usize,
-    /// The directions that do something there: first those of all elements, in order, then those of one element each.
+    /// The directions that do something there: first those of all elements, in order, then those of one element each, then sparse columns.
     pub(super) active: Vec<usize>,
-    /// Products of those: in the rows of the pivots and of the residual, and on the diagonal.
+    /// Products of those but the sparse columns, a row each, with all: in the rows of the pivots and of the residual, and on the diagonal.
     pub(super) products: DMatrix<f64>,
+    /// Those of each sparse column with itself.
+    pub(super) squares: Vec<f64>,
     /// That of those.
     pub(super) border: Border,
 }
@@ -55,7 +59,69 @@ impl Readings<'_> {
     }
 }
 
+/// Products of some sparse columns with some others, over the bins of a chunk.
+pub(super) struct Crossed {
+    /// The numbers of the first ones among all directions.
+    pub(super) first: [usize; 2],
+    pub(super) products: DMatrix<f64>,
+}
+
+impl Crossed {
+    /// Those of each column of one with each of the other, of one with itself each pair once; at readings with these numbers in the chunk and
+    /// these weights.
+    pub(super) fn of([one, other]: [&SparseChunk; 2], weights: impl Iterator<Item = (usize, f64)>) -> Self {
+        let is_one = one.first == other.first;
+        let mut products = DMatrix::zeros(one.columns, other.columns);
+        for (reading, weight) in weights {
+            for (column, value) in one.acting[reading].each() {
+                for (another, with) in other.acting[reading].each() {
+                    if !is_one || column < another {
+                        products[(column, another)] += weight * value * with;
+                    }
+                }
+            }
+        }
+        Self { first: [one.first, other.first], products }
+    }
+}
+
 impl Sums {
+    /// The product with itself of the direction at a place among those that are active.
+    pub(super) fn square(&self, place: usize) -> f64 {
+        let rows = self.products.nrows();
+        if place < rows { self.products[(place, place)] } else { self.squares[place - rows] }
+    }
+
+    /// Adds the products of sparse columns with the others of a tile, with themselves, and with baselines and gains. `places` has the place of
+    /// each sparse column among those that are active.
+    pub(super) fn take_sparse(
+        &mut self,
+        of: &Readings<'_>,
+        tile: &DMatrix<f64>,
+        sparse: &[SparseChunk],
+        [weighed, places]: [&[usize]; 2],
+    ) {
+        let Some(first) = sparse.first().map(|of| of.first) else { return };
+        let (rows, elements) = (self.products.nrows(), self.border.own.len());
+        let by_reading = tile.transpose();
+        for (at, (root, gain)) in of.roots.iter().zip(of.gains).enumerate() {
+            let (bin, element) = (of.bins[at / of.per_bin] - of.first_bin, weighed[at % of.per_bin]);
+            let with = by_reading.column(at);
+            for group in sparse {
+                for (column, value) in group.acting[bin * elements + element].each() {
+                    let (place, value) = (places[group.first + column - first], value * root);
+                    self.border.by_baseline[(element, place)] += value * root;
+                    self.border.by_gain[(element, place)] += value * gain;
+                    self.squares[place - rows] += value * value;
+                    let products = &mut self.products.as_mut_slice()[place * rows..(place + 1) * rows];
+                    for (sum, with) in products.iter_mut().zip(with.iter()) {
+                        *sum += value * with;
+                    }
+                }
+            }
+        }
+    }
+
     /// Adds the products of a tile, a row a reading and a column a direction: of the first directions with those after them, panel by
     /// panel, and of each other with itself and with the residual, which is the last if it is there. Of those that are the same both ways the
     /// ones above the diagonal are computed.

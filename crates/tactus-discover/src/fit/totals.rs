@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::parameters::Parameters;
 use super::problem::Problem;
 use super::random_walk::is_random_walk;
-use super::tiles::{Border, Sums, add, add_columns};
+use super::tiles::{Border, Crossed, Sums, add, add_columns};
 
 /// Which products a pass keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,12 +71,29 @@ impl Total {
         self
     }
 
+    /// Adds products of sparse columns with each other.
+    pub(super) fn add_crossed(&mut self, Crossed { first: [first, second], products }: &Crossed) {
+        for (other, column) in products.column_iter().enumerate() {
+            for (one, product) in column.iter().enumerate() {
+                self.products[(first + one, second + other)] += product;
+                self.products[(second + other, first + one)] += product;
+            }
+        }
+    }
+
     /// Adds the sums over a part of a block; parts come in order of time.
     pub(super) fn add(&mut self, number: usize, first_bin: usize, own: usize, sums: &Sums, kept: Kept) {
+        let rows = sums.products.nrows();
         for (place, column) in sums.active.iter().enumerate() {
             for (row, product) in sums.active.iter().zip(sums.products.column(place).iter()) {
                 self.products[(*row, *column)] += product;
+                if place >= rows {
+                    self.products[(*column, *row)] += product;
+                }
             }
+        }
+        for (column, square) in sums.active[rows..].iter().zip(&sums.squares) {
+            self.products[(*column, *column)] += square;
         }
         self.segments[sums.segment].add_of(&sums.active, &sums.border);
         if kept == Kept::All {
@@ -108,7 +125,8 @@ impl Block {
         }
     }
 
-    fn add(&mut self, own: usize, Sums { active, products, border, .. }: &Sums) {
+    fn add(&mut self, own: usize, sums: &Sums) {
+        let Sums { active, products, border, .. } = sums;
         let residual = self.rows.ncols() - 1;
         #[expect(clippy::cast_possible_truncation, reason = "parts of a test's statistic")]
         let single = |value: f64| value as f32;
@@ -119,7 +137,7 @@ impl Block {
             }
         }
         for (place, number) in active.iter().enumerate() {
-            self.diagonal[*number] += single(products[(place, place)]);
+            self.diagonal[*number] += single(sums.square(place));
         }
         add_columns(&mut self.by_baseline, active, &border.by_baseline, |to, of| *to += single(of));
         add_columns(&mut self.by_gain, active, &border.by_gain, |to, of| *to += single(of));

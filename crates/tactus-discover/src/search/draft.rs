@@ -31,7 +31,7 @@ use super::grow::{FLIPS, Search};
 use super::not_shown::NotShown;
 use super::score::{Score, flipped, largest, p_value};
 use crate::data::DiscoverError;
-use crate::fit::{BLOCKS_MAX, FOLDS, Fitted, Free, Grams, Term};
+use crate::fit::{BLOCKS_MAX, FOLDS, Fitted, Free, Grams, Sparse, Term};
 use crate::numbers::parallel;
 use crate::progress::Stage;
 
@@ -395,19 +395,21 @@ impl Search<'_> {
         let mut screened: Vec<Screened<'_>> = Vec::new();
         let mut rest = atoms;
         while !rest.is_empty() {
-            let mut directions = Vec::new();
+            let mut count = 0;
+            let mut columns = Vec::new();
             let mut of_atoms: Vec<(&Atom, Range<usize>)> = Vec::new();
             for atom in rest {
-                let count = directions.len() + atom.columns(sight.elements);
-                if !directions.is_empty() && count > self.columns_most() {
+                let first = count;
+                let end = first + atom.columns(sight.elements);
+                if first > 0 && end > self.columns_most() {
                     break;
                 }
-                let first = directions.len();
-                directions.extend(sight.columns(atom));
-                of_atoms.push((atom, first..directions.len()));
+                columns.push(sight.columns(atom));
+                of_atoms.push((atom, first..end));
+                count = end;
             }
             rest = &rest[of_atoms.len()..];
-            let grams = Arc::new(self.problem.grams_of_each(at, directions)?);
+            let grams = Arc::new(self.problem.grams_of_each(at, columns)?);
             screened.extend(of_atoms.into_iter().map(|(atom, own)| Screened {
                 atom,
                 own,
@@ -472,21 +474,21 @@ impl Search<'_> {
         })
     }
 
-    /// The products of atoms.
+    /// The products of atoms: of each with itself and with the first.
     fn products(
         &self,
         at: &Fitted,
         sight: &Arc<Sight>,
         atoms: Vec<Atom>,
     ) -> Result<(Vec<Weighed>, Grams), DiscoverError> {
-        let mut directions = Vec::new();
-        let mut weighed = Vec::new();
-        for atom in atoms {
-            let first = directions.len();
-            directions.extend(sight.columns(&atom));
-            weighed.push(Weighed { atom, directions: (first..directions.len()).collect() });
-        }
-        Ok((weighed, self.problem.grams(at, directions)?))
+        let columns: Vec<Sparse<'_>> = atoms.iter().map(|atom| sight.columns(atom)).collect();
+        let mut end = 0;
+        let of_atom = |atom: Atom| {
+            let first = end;
+            end += atom.columns(sight.elements);
+            Weighed { atom, directions: (first..end).collect() }
+        };
+        Ok((atoms.into_iter().map(of_atom).collect(), self.problem.grams(at, columns)?))
     }
 
     fn evidence_of<'a>(&self, additions: &'a [Addition], products: &'a DMatrix<f64>) -> Evidence<'a> {

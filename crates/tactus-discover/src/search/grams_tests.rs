@@ -7,7 +7,7 @@ use tactus_model::Effect;
 use tactus_model::effect::Definition;
 
 use super::{Score, standardised};
-use crate::fit::{Direction, FOLDS, Fitted, Free, Prepared, Problem, Term};
+use crate::fit::{Direction, FOLDS, Few, Fitted, Free, Hat, Prepared, Problem, Sparse, Term};
 use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
 
 /// The same products from whole columns, orthogonal to gains, baselines and the model's own parameters one by one.
@@ -49,7 +49,7 @@ fn products_are_those_of_whole_columns_that_are_projected_one_by_one() {
         let of_one = of_one.iter().map(|(element, values)| {
             Direction::computed(Some(*element), |bins: Range<usize>| values[bins].to_vec())
         });
-        tried.iter().map(|(start, free)| problem.towards(start, *free)).chain(of_one).collect()
+        tried.iter().map(|(start, free)| problem.towards(start, *free)).chain(of_one).collect::<Vec<_>>()
     };
     let grams = problem.grams(&at, directions()).unwrap();
     let of_each = problem.grams_of_each(&at, directions()).unwrap();
@@ -72,6 +72,79 @@ fn products_are_those_of_whole_columns_that_are_projected_one_by_one() {
     let left = problem.left(&at).unwrap();
     for ((left, weight), wanted) in left.iter().zip(problem.weights()).zip(whole.residual.iter()) {
         assert!((left * weight.sqrt() - wanted).abs() < 1e-4, "{left} {wanted}");
+    }
+}
+
+/// Of a curve that all elements share, of one with a weight for each element, and of two columns that act everywhere.
+#[test]
+fn products_of_sparse_columns_are_those_of_whole_columns() {
+    let known = known();
+    let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(5));
+    let frames = measured(&known, &[], &noise);
+    let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
+    let problem = prepared.problem();
+    let term = Term::of(&Effect::new("surface-offset", [("offset_mm", 0.01)]).unwrap());
+    let at = problem.fit_from(prepared.base.parameters.with(term), 3).unwrap();
+    let bins = problem.predictor.bins;
+    let (predicted, t_s) = (&at.predicted, &bins.t_s);
+    let knots: Vec<f64> = (0..5).map(|knot| 0.2 * f64::from(knot) * t_s[bins.len() - 1]).collect();
+    let acting = |group: usize, bin: usize, element: usize| -> Few {
+        let counts = predicted[bin * ELEMENTS + element] - 100.0;
+        let hats = (0..knots.len()).map(|knot| (knot, Hat::of(&knots, knot).at(t_s[bin])));
+        match group {
+            0 => Few::of(hats.filter(|(_, hat)| *hat > 0.0)).after(0, counts),
+            1 => Few::of([(0, t_s[bin].sin())]).after(element, counts),
+            _ => Few::of([(0, t_s[bin].sin()), (1, (3.0 * t_s[bin]).cos())]).after(0, 0.1),
+        }
+    };
+    let groups = [
+        0..knots.len(),
+        knots.len()..knots.len() + ELEMENTS,
+        knots.len() + ELEMENTS..knots.len() + ELEMENTS + 2,
+    ];
+    let sparse = || {
+        let of_group = |(group, columns): (usize, &Range<usize>)| {
+            Sparse::of(columns.len(), move |bins: Range<usize>| {
+                bins.flat_map(|bin| (0..ELEMENTS).map(move |element| (bin, element)))
+                    .map(|(bin, element)| acting(group, bin, element))
+                    .collect()
+            })
+        };
+        groups.iter().enumerate().map(of_group).collect::<Vec<_>>()
+    };
+    let mut columns = vec![vec![0.0; predicted.len()]; groups[2].end];
+    for reading in 0..predicted.len() {
+        for (group, first) in groups.iter().map(|columns| columns.start).enumerate() {
+            for (column, value) in acting(group, reading / ELEMENTS, reading % ELEMENTS).each() {
+                columns[first + column][reading] = value;
+            }
+        }
+    }
+    let grams = problem.grams(&at, sparse()).unwrap();
+    let of_each = problem.grams_of_each(&at, sparse()).unwrap();
+    let whole = Whole::of(&problem, &at, columns);
+    let group_of = |column: usize| groups.iter().position(|columns| columns.contains(&column)).unwrap();
+    let last = whole.columns.len();
+    assert_eq!(grams.reduced().nrows(), last + 1);
+    for (i, one) in whole.columns.iter().enumerate() {
+        let near = |found: f64, wanted: f64, scale: f64| {
+            assert!((found - wanted).abs() < 1e-5 * scale, "{i}: {found} {wanted} {scale}");
+        };
+        for (j, other) in whole.columns.iter().enumerate() {
+            let groups = [group_of(i), group_of(j)];
+            let is_kept = groups[0] == groups[1] || groups.contains(&0);
+            let wanted = if is_kept { one.dot(other) } else { 0.0 };
+            near(grams.reduced()[(i, j)], wanted, one.norm() * other.norm());
+        }
+        for grams in [&grams, &of_each] {
+            near(grams.reduced()[(i, i)], one.norm_squared(), one.norm_squared());
+            near(grams.wanted(i), one.dot(&whole.residual), one.norm() * 100.0);
+            let (of_grams, of_columns) = (Score::of_grams(grams, &[i]).z, whole.score(&problem, one));
+            assert!(
+                (of_grams - of_columns).abs() < 1e-2 * of_columns.max(1.0),
+                "{i}: {of_grams} {of_columns}"
+            );
+        }
     }
 }
 

@@ -84,7 +84,8 @@ impl Search<'_> {
             let (forms, feature) = (&forms, feature.clone());
             Direction::computed(feature.only(), move |bins| forms.values(&feature, bins, elements))
         };
-        let grams = problem.grams_of_each(at, features.iter().map(column).collect())?;
+        let columns: Vec<Direction<'_>> = features.iter().map(column).collect();
+        let grams = problem.grams_of_each(at, columns)?;
         let scored = |index: usize| {
             let size = grams.size(index);
             // What recalibration takes up is no feature, such as the signal of an element whose gain is fitted.

@@ -369,15 +369,6 @@ impl Atom {
         }
     }
 
-    /// Of a column: its knot, `None` for the whole curve, and its element, `None` for all.
-    pub(super) fn part(&self, number: usize, elements: usize) -> (Option<usize>, Option<usize>) {
-        match (self.of_elements, &self.curve) {
-            (true, Some(_)) => (None, Some(number % elements)),
-            (true, None) => (Some(number % self.knots_each()), Some(number / self.knots_each())),
-            (false, _) => (Some(number), None),
-        }
-    }
-
     /// True if another acts on the same by the same.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         self.carrier == other.carrier && self.covariates[0] == other.covariates[0]

@@ -1,5 +1,7 @@
 //! What a draft would see and act on: the covariates of each bin, and what one unit of each carrier does.
 
+use std::f64::consts::TAU;
+use std::iter::repeat_n;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -8,7 +10,7 @@ use tactus_model::{Covariate, Seen, Trace};
 
 use super::grammar::{Acting, Atom};
 use crate::data::{DiscoverError, interval_s};
-use crate::fit::{Direction, Fitted, Free, Grams, Hat, Problem, Term};
+use crate::fit::{Few, Fitted, Free, Grams, Hat, Problem, Sparse, Term};
 
 /// Readings below this share of the largest signal of their bin do not place knots.
 const LOUD_SHARE: f64 = 0.02;
@@ -241,49 +243,41 @@ impl Sight {
     }
 
     /// The columns of an atom: what it does for a unit at each knot, at each pair of knots, or for each element.
-    pub(super) fn columns<'a>(self: &Arc<Self>, atom: &Atom) -> Vec<Direction<'a>> {
-        let count = atom.columns(self.elements);
-        let column = |number: usize| -> Direction<'a> {
-            let (sight, atom) = (Arc::clone(self), atom.clone());
-            let (_, only) = atom.part(number, self.elements);
-            Direction::computed(only, move |bins| sight.column(&atom, number, bins))
-        };
-        (0..count).map(column).collect()
+    pub(super) fn columns<'a>(self: &Arc<Self>, atom: &Atom) -> Sparse<'a> {
+        let columns = atom.columns(self.elements);
+        let (sight, atom) = (Arc::clone(self), atom.clone());
+        Sparse::of(columns, move |bins| sight.acting(&atom, bins))
     }
 
-    /// The values of a column of an atom: bin by bin, element by element, or those at its only element.
-    fn column(&self, atom: &Atom, number: usize, bins: Range<usize>) -> Vec<f64> {
-        let unit = self.unit_of(atom.carrier);
-        let (curve, only) = atom.part(number, self.elements);
-        let elements = only.map_or(0..self.elements, |element| element..element + 1);
-        let mut column = vec![0.0; bins.len() * elements.len()];
-        let first_bin = bins.start;
-        let is_then = self.is_then(atom.when);
-        let factor = atom.factor(curve);
+    /// The columns of an atom that act on each reading: bin by bin, element by element.
+    fn acting(&self, atom: &Atom, bins: Range<usize>) -> Vec<Few> {
+        let (unit, is_then) = (self.unit_of(atom.carrier), self.is_then(atom.when));
         let at: Vec<(&[f64], bool)> =
             atom.covariates.iter().map(|one| (self.along(*one), one.is_of_element())).collect();
         let is_common = at.iter().all(|(_, is_of_element)| !is_of_element);
-        let factor = |bin: usize, element: usize| {
+        let of_curve = |bin: usize, element: usize| {
             let mut values = [0.0; 2];
             for (value, (along, is_of_element)) in values.iter_mut().zip(&at) {
                 *value = along[if *is_of_element { bin * self.elements + element } else { bin }];
             }
-            factor.at(values)
+            atom.acting(values)
         };
-        for bin in bins.filter(|bin| is_then[*bin]) {
-            let common = if is_common { factor(bin, 0) } else { 0.0 };
-            if is_common && common == 0.0 {
+        // How many columns the next element is further.
+        let apart = if atom.of_elements { atom.columns(1) } else { 0 };
+        let mut acting = Vec::with_capacity(bins.len() * self.elements);
+        for bin in bins {
+            if !is_then[bin] {
+                acting.extend(repeat_n(Few::default(), self.elements));
                 continue;
             }
-            for element in elements.clone() {
-                let factor = if is_common { common } else { factor(bin, element) };
+            let common = is_common.then(|| of_curve(bin, 0));
+            acting.extend((0..self.elements).map(|element| {
                 let weight = atom.weights.as_ref().map_or(1.0, |weights| weights[element]);
-                let reading = bin * self.elements + element;
-                column[(bin - first_bin) * elements.len() + element - elements.start] =
-                    factor * weight * f64::from(unit[reading]);
-            }
+                let unit = f64::from(unit[bin * self.elements + element]);
+                common.unwrap_or_else(|| of_curve(bin, element)).after(element * apart, weight * unit)
+            }));
         }
-        column
+        acting
     }
 
     /// An atom of single elements with one curve for all of them: that which its knots share most, from the products of each.
@@ -346,67 +340,34 @@ fn straightened(linear: f64, quadratic_per_mm: f64) -> f64 {
     (root.sqrt() - 1.0) / (2.0 * quadratic_per_mm)
 }
 
-/// What an atom, or a part of it, multiplies its carrier by.
-enum Factor<'a> {
-    /// 1 wherever the covariates have values.
-    One,
-    /// Of a tone, sine and cosine.
-    Tone { per_unit: f64, parts: [f64; 2] },
-    /// The hats of a knot of each covariate.
-    Hats(Hat, Option<Hat>),
-    /// A curve through its knots, and for two covariates a table.
-    Curve { knots: &'a [Vec<f64>], values: &'a [f64] },
-}
-
 impl Atom {
-    /// That of a knot, or of a pair of them, or of all with the curve.
-    fn factor(&self, part: Option<usize>) -> Factor<'_> {
-        if let Some(per_unit) = self.per_unit {
-            let parts = match (part, &self.curve) {
-                (Some(part), _) => std::array::from_fn(|one| f64::from(u8::from(one == part))),
-                (None, Some(curve)) => [curve[0], curve[1]],
-                (None, None) => return Factor::One,
-            };
-            return Factor::Tone { per_unit, parts };
-        }
-        match (part, self.knots.as_slice(), &self.curve) {
-            (Some(knot), [only], _) => Factor::Hats(Hat::of(only, knot), None),
-            (Some(knot), [first, second], _) => {
-                Factor::Hats(Hat::of(first, knot / second.len()), Some(Hat::of(second, knot % second.len())))
-            }
-            (None, knots @ ([_] | [_, _]), Some(curve)) => Factor::Curve { knots, values: curve },
-            _ => Factor::One,
-        }
-    }
-}
-
-impl Factor<'_> {
-    /// Its value at those of the covariates; 0 where one has none. The second is 0 where there is only one covariate.
-    fn at(&self, at: [f64; 2]) -> f64 {
+    /// What the columns of one element have at values of the covariates: those of the knots around, or that of the whole curve, once it is known. None
+    /// where a covariate has no value; the second is 0 where there is only one.
+    fn acting(&self, at: [f64; 2]) -> Few {
         if at.iter().any(|one| one.is_nan()) {
-            return 0.0;
+            return Few::default();
         }
-        match self {
-            Self::One => 1.0,
-            Self::Tone { per_unit, parts: [of_sin, of_cos] } => {
-                let (sin, cos) = (std::f64::consts::TAU * per_unit * at[0]).sin_cos();
-                of_sin * sin + of_cos * cos
-            }
-            Self::Hats(first, second) => {
-                let of_first = first.at(at[0]);
-                if of_first == 0.0 { 0.0 } else { of_first * second.map_or(1.0, |hat| hat.at(at[1])) }
-            }
-            Self::Curve { knots, values } => match knots {
-                [only] => beside(only, at[0]).iter().map(|(knot, part)| values[*knot] * part).sum(),
+        let of_knots = if let Some(per_unit) = self.per_unit {
+            let (sin, cos) = (TAU * per_unit * at[0]).sin_cos();
+            Few::of([(0, sin), (1, cos)])
+        } else {
+            match self.knots.as_slice() {
+                [] => Few::of([(0, 1.0)]),
+                [only] => Few::of(beside(only, at[0])),
                 [first, second, ..] => {
                     let columns = beside(second, at[1]);
                     let of_row = |(row, by_row): (usize, f64)| {
-                        columns.map(|(column, part)| values[row * second.len() + column] * (by_row * part))
+                        columns.map(|(column, part)| (row * second.len() + column, by_row * part))
                     };
-                    beside(first, at[0]).into_iter().flat_map(of_row).sum()
+                    Few::of(beside(first, at[0]).into_iter().flat_map(of_row))
                 }
-                [] => 1.0,
-            },
+            }
+        };
+        match &self.curve {
+            Some(curve) if self.of_elements => {
+                Few::of([(0, of_knots.each().map(|(knot, part)| curve[knot] * part).sum())])
+            }
+            _ => of_knots,
         }
     }
 }
