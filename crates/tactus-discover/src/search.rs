@@ -102,6 +102,7 @@
 //! | locate.rs | `Q_MAX` | `0.05` | convention | a false-discovery rate of 5 % |
 //! | locate.rs | `OWN_LEAST` | `1e-3` | convention | recalibration takes up the rest |
 //! | memory.rs | `MODELS_MAX` | `8` | cost | 5 MB each |
+//! | memory.rs | `DRAFTED_MAX` | `2` | cost | up to 50 MB each |
 //! | not_shown.rs | `REACH_LEAST` | `15.0` | convention | a whole range of 15 standard errors; not measured |
 //! | not_shown.rs | `MOVING_LEAST` | `20` | convention | fewer frames are the ends of moves |
 //! | pass.rs | `FREE_SHARE` | `0.4` | measured | on tuning sets of 2026-11-25: right classes 0.83 and more, wrong ones 0.21; no recipe is kept, since reports do not have it |

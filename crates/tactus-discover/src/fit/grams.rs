@@ -78,11 +78,10 @@ impl Problem<'_> {
                 reduced[(one, left - 1)] = reduced[(left - 1, one)];
             }
         }
-        for [one, other] in
-            groups.iter().skip(1).flat_map(|one| groups.iter().skip(1).map(move |other| [one, other]))
-        {
-            if one != other {
+        for (nth, one) in groups.iter().enumerate().skip(1) {
+            for other in &groups[nth + 1..] {
                 reduced.view_mut((one.start, other.start), (one.len(), other.len())).fill(0.0);
+                reduced.view_mut((other.start, one.start), (other.len(), one.len())).fill(0.0);
             }
         }
         let fold = self.press_of_blocks(&total.blocks).into_iter().map(|press| press % FOLDS).collect();

@@ -4,9 +4,11 @@
 use std::ops::Range;
 
 /// Greatest number of columns that act on a reading: those at the knots around a value, of two covariates.
-pub(crate) const FEW_MAX: usize = 4;
+const FEW_MAX: usize = 4;
+/// The room that they take, in values.
+pub(super) const FEW_VALUES: usize = size_of::<Few>() / size_of::<f64>();
 
-/// Columns of which at most [`FEW_MAX`] act on a reading.
+/// Columns of which at most four act on a reading.
 pub(crate) struct Sparse<'a> {
     /// How many there are.
     pub(super) columns: usize,
@@ -26,8 +28,11 @@ pub(super) struct SparseChunk {
     /// The number of the first column among all directions.
     pub(super) first: usize,
     pub(super) columns: usize,
+    elements: usize,
     /// Bin by bin, element by element.
-    pub(super) acting: Vec<Few>,
+    acting: Vec<Few>,
+    /// For each bin whether any acts.
+    acts: Vec<bool>,
 }
 
 impl<'a> Sparse<'a> {
@@ -38,7 +43,7 @@ impl<'a> Sparse<'a> {
 }
 
 impl Few {
-    /// These columns with these values, [`FEW_MAX`] at most.
+    /// These columns with these values: different ones, four at most. What has the value 0 counts as none.
     pub(crate) fn of(columns: impl IntoIterator<Item = (usize, f64)>) -> Self {
         let mut acting = Self::default();
         let places = acting.columns.iter_mut().zip(&mut acting.values);
@@ -66,6 +71,19 @@ impl Few {
 }
 
 impl SparseChunk {
+    /// Of an array of so many elements, from the `first` direction on.
+    pub(super) fn of(first: usize, sparse: &Sparse<'_>, bins: Range<usize>, elements: usize) -> Self {
+        let acting = (sparse.acting)(bins);
+        let acts = |of_bin: &[Few]| of_bin.iter().any(|few| few.each().next().is_some());
+        let acts = acting.chunks_exact(elements).map(acts).collect();
+        Self { first, columns: sparse.columns, elements, acting, acts }
+    }
+
+    /// What acts on the elements at a bin, counted from the chunk's first; `None` if nothing does.
+    pub(super) fn at(&self, bin: usize) -> Option<&[Few]> {
+        self.acts[bin].then(|| &self.acting[bin * self.elements..(bin + 1) * self.elements])
+    }
+
     /// Numbers of all its columns among all directions.
     pub(super) fn numbers(&self) -> Range<usize> {
         self.first..self.first + self.columns

@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use super::parameters::Parameters;
 use super::predictor::{Reached, Stream};
 use super::problem::Problem;
-use super::sparse::{Few, Sparse, SparseChunk};
+use super::sparse::{FEW_VALUES, Sparse, SparseChunk};
 use super::tiles::{Alone, Border, Crossed, Readings, Sums};
 use super::totals::{Kept, Segments, Total};
 use crate::data::DiscoverError;
@@ -52,7 +52,8 @@ pub(crate) enum Direction<'a> {
 
 /// The directions of a pass, in the order of their numbers.
 pub(crate) struct Directions<'a> {
-    /// Those that are computed each by itself; beside sparse columns, those of a model's own parameters alone.
+    /// Those that are computed each by itself. Beside sparse columns there are those of a model's own parameters alone: products of directions of one
+    /// element with sparse columns are not computed.
     pub(super) each: Vec<Direction<'a>>,
     /// Groups of sparse columns. Products of two groups are not computed, but for those with the first one.
     pub(super) sparse: Vec<Sparse<'a>>,
@@ -164,7 +165,7 @@ impl Problem<'_> {
         let mut trunk = self.predictor.stream(at.clone())?;
         let pivots = if kept == Kept::OwnAndBlocks { own } else { count };
         let [least, most] = CHUNK_BINS;
-        let held = count + size_of::<Few>() / size_of::<f64>() * sparse.len();
+        let held = count + FEW_VALUES * sparse.len();
         let chunk_bins = (CHUNK_COLUMNS / held).clamp(least, most);
         let chunks =
             (0..bins.len()).step_by(chunk_bins).map(|first| first..(first + chunk_bins).min(bins.len()));
@@ -184,7 +185,9 @@ impl Problem<'_> {
                 for (number, first_bin, sums) in parts {
                     total.add(number, first_bin, own, &sums, kept);
                 }
-                crossed.iter().for_each(|crossed| total.add_crossed(crossed));
+                for crossed in &crossed {
+                    total.add_crossed(crossed);
+                }
             }
             computed = next?;
         }
@@ -225,33 +228,30 @@ impl Problem<'_> {
             }
         };
         let columns: Vec<Column> = values.into_iter().zip(running).map(column).collect();
-        let mut first = columns.len();
-        let of_group = |(of, acting): (&Sparse<'_>, Vec<Few>)| {
-            let group = SparseChunk { first, columns: of.columns, acting };
-            first += of.columns;
-            group
+        let mut end = columns.len();
+        let first_of = |of: &Sparse<'_>| {
+            let first = end;
+            end += of.columns;
+            first
         };
-        let acting = parallel::map(sparse, |of| (of.acting)(range.clone()));
-        let sparse = sparse.iter().zip(acting).map(of_group).collect();
+        let firsts: Vec<usize> = sparse.iter().map(first_of).collect();
+        let groups: Vec<(usize, &Sparse<'_>)> = firsts.into_iter().zip(sparse).collect();
+        let elements = self.predictor.bins.elements;
+        let sparse =
+            parallel::map(&groups, |(first, of)| SparseChunk::of(*first, of, range.clone(), elements));
         Ok(Chunk { columns, sparse, bins: range, by_gain })
     }
 
     /// Products of the columns of each sparse group of a chunk with each other, and with those of the first group.
     fn crossed(&self, chunk: &Chunk) -> Vec<Crossed> {
-        let elements = self.predictor.bins.elements;
-        let weights = || {
-            let used = chunk.bins.clone().filter(|bin| self.train[*bin] > 0.0);
-            used.flat_map(|bin| {
-                let first = (bin - chunk.bins.start) * elements;
-                let weight =
-                    move |(element, weight): (usize, &f64)| (first + element, self.train[bin] * weight);
-                self.element_weight.iter().enumerate().map(weight)
-            })
-        };
+        let used = chunk.bins.clone().filter(|bin| self.train[*bin] > 0.0);
+        let bins: Vec<(usize, f64)> = used.map(|bin| (bin - chunk.bins.start, self.train[bin])).collect();
         let groups = chunk.sparse.len();
         let pairs: Vec<[usize; 2]> =
             (0..groups).map(|one| [one, one]).chain((1..groups).map(|one| [0, one])).collect();
-        parallel::map(&pairs, |pair| Crossed::of(pair.map(|one| &chunk.sparse[one]), weights()))
+        parallel::map(&pairs, |pair| {
+            Crossed::of(pair.map(|one| &chunk.sparse[one]), &bins, &self.element_weight)
+        })
     }
 
     /// Sums over each part of a chunk that belongs to one block and one segment, with the block's number and the part's first bin.
@@ -433,12 +433,10 @@ impl Chunk {
         let (Some(first), Some(last)) = (self.sparse.first(), self.sparse.last()) else {
             return (Vec::new(), Vec::new());
         };
-        let elements = first.acting.len() / self.bins.len();
         let mut acts = vec![false; last.numbers().end - first.first];
         for group in &self.sparse {
             let of_group = &mut acts[group.first - first.first..];
-            for bin in bins {
-                let of_bin = &group.acting[(bin - self.bins.start) * elements..];
+            for of_bin in bins.iter().filter_map(|bin| group.at(bin - self.bins.start)) {
                 let each = weighed.iter().flat_map(|element| of_bin[*element].each());
                 each.for_each(|(column, _)| of_group[column] = true);
             }

@@ -67,16 +67,21 @@ pub(super) struct Crossed {
 }
 
 impl Crossed {
-    /// Those of each column of one with each of the other, of one with itself each pair once; at readings with these numbers in the chunk and
-    /// these weights.
-    pub(super) fn of([one, other]: [&SparseChunk; 2], weights: impl Iterator<Item = (usize, f64)>) -> Self {
+    /// Products of each column of one group with each of another; within one group each pair once. Bins are counted from the chunk's first, each with
+    /// its weight.
+    pub(super) fn of([one, other]: [&SparseChunk; 2], bins: &[(usize, f64)], element_weight: &[f64]) -> Self {
         let is_one = one.first == other.first;
         let mut products = DMatrix::zeros(one.columns, other.columns);
-        for (reading, weight) in weights {
-            for (column, value) in one.acting[reading].each() {
-                for (another, with) in other.acting[reading].each() {
-                    if !is_one || column < another {
-                        products[(column, another)] += weight * value * with;
+        for (bin, of_bin) in bins {
+            let (Some(of_one), Some(of_other)) = (one.at(*bin), other.at(*bin)) else { continue };
+            for ((of_one, of_other), of_element) in of_one.iter().zip(of_other).zip(element_weight) {
+                let weight = of_bin * of_element;
+                for (column, value) in of_one.each().filter(|_| weight > 0.0) {
+                    let value = weight * value;
+                    for (another, with) in of_other.each() {
+                        if !is_one || column < another {
+                            products[(column, another)] += value * with;
+                        }
                     }
                 }
             }
@@ -102,20 +107,23 @@ impl Sums {
         [weighed, places]: [&[usize]; 2],
     ) {
         let Some(first) = sparse.first().map(|of| of.first) else { return };
-        let (rows, elements) = (self.products.nrows(), self.border.own.len());
+        let rows = self.products.nrows();
         let by_reading = tile.transpose();
-        for (at, (root, gain)) in of.roots.iter().zip(of.gains).enumerate() {
-            let (bin, element) = (of.bins[at / of.per_bin] - of.first_bin, weighed[at % of.per_bin]);
-            let with = by_reading.column(at);
-            for group in sparse {
-                for (column, value) in group.acting[bin * elements + element].each() {
-                    let (place, value) = (places[group.first + column - first], value * root);
-                    self.border.by_baseline[(element, place)] += value * root;
-                    self.border.by_gain[(element, place)] += value * gain;
-                    self.squares[place - rows] += value * value;
-                    let products = &mut self.products.as_mut_slice()[place * rows..(place + 1) * rows];
-                    for (sum, with) in products.iter_mut().zip(with.iter()) {
-                        *sum += value * with;
+        for group in sparse {
+            for (nth, bin) in of.bins.iter().enumerate() {
+                let Some(acting) = group.at(bin - of.first_bin) else { continue };
+                for (among, element) in weighed.iter().enumerate() {
+                    let at = nth * of.per_bin + among;
+                    let (root, gain, with) = (of.roots[at], of.gains[at], by_reading.column(at));
+                    for (column, value) in acting[*element].each() {
+                        let (place, value) = (places[group.first + column - first], value * root);
+                        self.border.by_baseline[(*element, place)] += value * root;
+                        self.border.by_gain[(*element, place)] += value * gain;
+                        self.squares[place - rows] += value * value;
+                        let products = &mut self.products.as_mut_slice()[place * rows..(place + 1) * rows];
+                        for (sum, with) in products.iter_mut().zip(with.iter()) {
+                            *sum += value * with;
+                        }
                     }
                 }
             }

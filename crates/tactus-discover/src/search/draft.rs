@@ -18,7 +18,7 @@ mod sight;
 mod words;
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::DMatrix;
 use tactus_model::effect::{Draft, PipelineStage};
@@ -27,7 +27,7 @@ use self::form::AsEffect;
 use self::grammar::Atom;
 use self::sight::{KNOTS_OF_ELEMENTS, Sight};
 use super::evidence::{Addition, Evidence, Gain, Signs};
-use super::grow::{FLIPS, Search};
+use super::grow::{ALPHA, FLIPS, Search};
 use super::not_shown::NotShown;
 use super::score::{Score, flipped, largest, p_value};
 use crate::data::DiscoverError;
@@ -185,8 +185,24 @@ struct Weighed {
     directions: Vec<usize>,
 }
 
+/// What drafting at a model begins with, whatever a draft has to be better than.
+pub(super) struct Begun {
+    /// Probability that noise gives as much to any atom.
+    p_value: f64,
+    /// The atoms that come first, with their products; none where that is likely.
+    weighed: Option<(Vec<Weighed>, Grams)>,
+    /// Number of atoms of the grammar.
+    count: f64,
+    /// The atoms that were tried as effects, by their places among those that are weighed and the names of the effects.
+    tried: Mutex<Vec<((usize, String), Unseen)>>,
+}
+
+/// An atom as an effect, and by how much it is nearer to presses that its numbers have not seen, block by block; `None` if it gains nothing.
+type Unseen = Option<(AsEffect, Vec<f64>)>;
+
 /// Atoms that compete.
 struct Field<'a> {
+    begun: &'a Begun,
     weighed: &'a [Weighed],
     grams: &'a Grams,
     additions: &'a [Addition],
@@ -194,8 +210,6 @@ struct Field<'a> {
     ranked: Vec<(usize, f64)>,
     /// The classes of the library that come nearest, with the logarithm of their odds.
     classes: Vec<(&'static str, f64)>,
-    /// Number of atoms of the grammar.
-    count: f64,
 }
 
 /// The atom of a field that is tried as an effect.
@@ -221,8 +235,8 @@ impl Field<'_> {
 
 impl Search<'_> {
     /// Drafts what a model leaves, as an effect of this name. If what comes first is no draft, that which comes next is tried, as if the first
-    /// were not in the grammar. If noise would give as much to any draft with a probability above `alpha`, or what comes first acts at one of the
-    /// `closed` stages, there is none.
+    /// were not in the grammar. If noise would give as much to any draft with a probability above `alpha`, which is [`ALPHA`] at most, or what comes
+    /// first acts at one of the `closed` stages, there is none.
     pub(crate) fn draft(
         &self,
         at: &Fitted,
@@ -233,20 +247,18 @@ impl Search<'_> {
     ) -> Result<Outcome, DiscoverError> {
         let sight = Arc::new(Sight::of(self.problem, at)?);
         self.reporter.enter(Stage::Drafting, "drafting what nobody has named");
-        let atoms = self.atoms(at, &sight);
-        let (p_value, first) = self.screened(at, &sight, &atoms)?;
-        if p_value > alpha {
+        let begun = self.memory.drafts.at(&at.parameters, || self.begun(at, &sight).map(Arc::new))?;
+        let Some((weighed, grams)) = begun.weighed.as_ref().filter(|_| begun.p_value <= alpha) else {
             return Ok(Err(NoDraft::Noise));
-        }
-        let (weighed, grams) = self.products(at, &sight, first)?;
-        let additions = additions(&weighed, &grams, atoms.len() as f64);
+        };
+        let additions = additions(weighed, grams, begun.count);
         let mut field = Field {
             ranked: ranked(&self.evidence_of(&additions, grams.reduced())),
             additions: &additions,
-            weighed: &weighed,
-            grams: &grams,
+            begun: &begun,
+            weighed,
+            grams,
             classes: self.classes(at, against)?,
-            count: atoms.len() as f64,
         };
         let mut why = NoDraft::NoGain;
         for nth in 0..TRIED_MAX {
@@ -256,7 +268,7 @@ impl Search<'_> {
             if closed.contains(&carrier.stage(covariates)) {
                 return Ok(Err(NoDraft::OfAName));
             }
-            match self.drafted(at, &sight, &field, (best, p_value), (name, against))? {
+            match self.drafted(at, &sight, &field, best, (name, against))? {
                 Ok(found) => return Ok(Ok(found)),
                 Err(other) if nth == 0 => why = other,
                 Err(_) => (),
@@ -264,6 +276,13 @@ impl Search<'_> {
             field.leave_out(atom);
         }
         Ok(Err(why))
+    }
+
+    fn begun(&self, at: &Fitted, sight: &Arc<Sight>) -> Result<Begun, DiscoverError> {
+        let atoms = self.atoms(at, sight);
+        let (p_value, first) = self.screened(at, sight, &atoms)?;
+        let weighed = if p_value > ALPHA { None } else { Some(self.products(at, sight, first)?) };
+        Ok(Begun { p_value, weighed, count: atoms.len() as f64, tried: Mutex::default() })
     }
 
     /// The atoms of the grammar, without those of single elements that take too much memory.
@@ -288,7 +307,7 @@ impl Search<'_> {
             let fine = |one: usize| form::finer(&field.weighed[one].atom, sight);
             let (of, atoms): (Vec<usize>, Vec<Atom>) =
                 as_good.iter().flat_map(|(one, _)| fine(*one).into_iter().map(|atom| (*one, atom))).unzip();
-            let ranked = self.ranked(at, sight, &atoms, field.count)?;
+            let ranked = self.ranked(at, sight, &atoms, field.begun.count)?;
             let first = of[ranked.first().map_or(0, |(place, _)| *place)];
             let as_fine: Vec<usize> =
                 as_good_as_first(&ranked).into_iter().map(|(place, _)| of[place]).collect();
@@ -334,7 +353,7 @@ impl Search<'_> {
         at: &Fitted,
         sight: &Arc<Sight>,
         field: &Field<'_>,
-        (Best { atom: best, ln_odds, alike }, p_value): (Best, f64),
+        Best { atom: best, ln_odds, alike }: Best,
         (name, against): (&str, Against<'_>),
     ) -> Result<Outcome, DiscoverError> {
         let folds = self.folds(field, best);
@@ -347,9 +366,8 @@ impl Search<'_> {
         if let (Some((class, _)), Against::Classes { .. }) = (as_near, against) {
             return Ok(Err(NoDraft::Class(class)));
         }
-        let atom = field.weighed[best].atom.clone();
         let Some((AsEffect { draft, at: with, covariance, knots }, unseen_gains)) =
-            self.as_effect(at, sight, atom, field.count, name)?
+            self.tried(at, sight, field, best, name)?
         else {
             return Ok(Err(NoDraft::NoGain));
         };
@@ -369,7 +387,8 @@ impl Search<'_> {
             return Ok(Err(NoDraft::NoGain));
         }
         let numbers = covariance.len() + draft.weights.as_ref().map_or(0, Vec::len);
-        let ln_odds_as_chosen = self.ln_odds_of_numbers(at, &with, numbers) - field.count.ln();
+        let Begun { p_value, count, .. } = *field.begun;
+        let ln_odds_as_chosen = self.ln_odds_of_numbers(at, &with, numbers) - count.ln();
         Ok(Ok(Box::new(Drafted {
             ln_odds_as_chosen,
             draft,
@@ -383,6 +402,27 @@ impl Search<'_> {
             nearest,
             alike,
         })))
+    }
+
+    /// An atom of a field as an effect of this name: as it was tried before, if it was.
+    fn tried(
+        &self,
+        at: &Fitted,
+        sight: &Arc<Sight>,
+        field: &Field<'_>,
+        atom: usize,
+        name: &str,
+    ) -> Result<Unseen, DiscoverError> {
+        let tried = || field.begun.tried.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_it = |(known, _): &&((usize, String), Unseen)| (known.0, known.1.as_str()) == (atom, name);
+        let known = tried().iter().find(is_it).map(|(_, found)| found.clone());
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let of = field.weighed[atom].atom.clone();
+        let found = self.as_effect(at, sight, of, field.begun.count, name)?;
+        tried().push(((atom, name.to_owned()), found.clone()));
+        Ok(found)
     }
 
     /// Probability that noise gives as much to any atom, and the atoms that come first.

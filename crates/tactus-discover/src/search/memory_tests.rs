@@ -11,7 +11,7 @@ fn what_is_known_of_a_model_is_not_computed_again() {
     let mut other = model.clone();
     other.psf.sigma_intercept_mm += 1e-12;
     let computed = Cell::new(0);
-    let kept = Kept::default();
+    let kept: Kept<_> = Kept::default();
     let ask = |of: &Parameters| {
         kept.at(of, || {
             computed.set(computed.get() + 1);
@@ -30,7 +30,7 @@ fn the_oldest_is_forgotten_and_a_failure_is_not_kept() {
         model.psf.sigma_intercept_mm += nth as f64;
         model
     };
-    let kept = Kept::default();
+    let kept: Kept<_> = Kept::default();
     let failed = kept.at(&model(0), || Err(TooLittle::FewPresses { fitted: 0, least: 1 }.into()));
     assert!(failed.is_err());
     for nth in 0..=MODELS_MAX {

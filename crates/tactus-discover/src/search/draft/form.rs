@@ -14,7 +14,7 @@ use tactus_model::effect::{Carrier, Draft};
 use super::curves::Curve;
 use super::grammar::Atom;
 use super::sight::Sight;
-use super::{KNOTS, KNOTS_OF_SECOND, additions, as_good_as_first, curves, grammar, words};
+use super::{KNOTS, KNOTS_OF_SECOND, Unseen, additions, as_good_as_first, curves, grammar, words};
 use crate::data::DiscoverError;
 use crate::fit::{FOLDS, Fitted, Grams, Term};
 use crate::search::evidence::Addition;
@@ -30,6 +30,7 @@ const FINER: [usize; 2] = [2, 4];
 const FINER_OF_SECOND: usize = 2;
 
 /// A draft as an effect, fitted.
+#[derive(Clone)]
 pub(super) struct AsEffect {
     pub(super) draft: Draft,
     pub(super) at: Fitted,
@@ -50,7 +51,7 @@ impl Search<'_> {
         atom: Atom,
         among: f64,
         name: &str,
-    ) -> Result<Option<(AsEffect, Vec<f64>)>, DiscoverError> {
+    ) -> Result<Unseen, DiscoverError> {
         let atom = self.with_form(at, sight, atom, among)?;
         let Some(first) = self.in_form(at, sight, &atom, name, at.cost)? else { return Ok(None) };
         // Beside the model without it as that was fitted.
