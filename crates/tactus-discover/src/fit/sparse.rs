@@ -5,8 +5,6 @@ use std::ops::Range;
 
 /// Greatest number of columns that act on a reading: those at the knots around a value, of two covariates.
 const FEW_MAX: usize = 4;
-/// The room that they take, in values.
-pub(super) const FEW_VALUES: usize = size_of::<Few>() / size_of::<f64>();
 
 /// Columns of which at most four act on a reading.
 pub(crate) struct Sparse<'a> {

@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use super::parameters::Parameters;
 use super::predictor::{Reached, Stream};
 use super::problem::Problem;
-use super::sparse::{FEW_VALUES, Sparse, SparseChunk};
+use super::sparse::{Few, Sparse, SparseChunk};
 use super::tiles::{Alone, Border, Crossed, Readings, Sums};
 use super::totals::{Kept, Segments, Total};
 use crate::data::DiscoverError;
@@ -165,7 +165,7 @@ impl Problem<'_> {
         let mut trunk = self.predictor.stream(at.clone())?;
         let pivots = if kept == Kept::OwnAndBlocks { own } else { count };
         let [least, most] = CHUNK_BINS;
-        let held = count + FEW_VALUES * sparse.len();
+        let held = count + size_of::<Few>() / size_of::<f64>() * sparse.len();
         let chunk_bins = (CHUNK_COLUMNS / held).clamp(least, most);
         let chunks =
             (0..bins.len()).step_by(chunk_bins).map(|first| first..(first + chunk_bins).min(bins.len()));
