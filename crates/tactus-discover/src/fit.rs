@@ -103,5 +103,5 @@ pub(crate) use prepare::Prepared;
 pub(crate) use problem::{Fitted, Free, Problem, undone};
 pub use random_walk::RunWalks;
 pub(crate) use random_walk::{RANDOM_WALK, RandomWalk, is_random_walk};
-pub(crate) use sparse::{Few, Sparse};
+pub(crate) use sparse::{Few, Sparse, in_a_row};
 pub(crate) use sums::{BLOCKS_MAX, Direction};

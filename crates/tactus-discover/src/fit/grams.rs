@@ -4,14 +4,13 @@
 //! model's own parameters fit. A step of a fit, the odds of any set of additions, and tests that flip the signs of blocks follow
 //! without the data.
 
-use std::ops::Range;
-
 use nalgebra::DMatrix;
 
 use super::elimination::{Elimination, Parts};
 use super::folds::FOLDS;
 use super::parameters::Parameters;
 use super::problem::{Fitted, Problem};
+use super::sparse::in_a_row;
 use super::sums::{Direction, Directions, with_more_gain};
 use super::totals::{Kept, Segments};
 use crate::data::DiscoverError;
@@ -53,16 +52,9 @@ impl Problem<'_> {
         kept: Kept,
     ) -> Result<Grams, DiscoverError> {
         let mut all = self.own(&at.parameters);
-        let (own, mut end) = (all.len(), each.len());
+        let own = all.len();
+        let groups = in_a_row(each.len(), sparse.iter().map(|of| of.columns));
         all.extend(each.into_iter().map(|direction| direction.after(own)));
-        let groups: Vec<Range<usize>> = sparse
-            .iter()
-            .map(|of| {
-                let first = end;
-                end += of.columns;
-                first..end
-            })
-            .collect();
         let all = Directions { each: all, sparse };
         let segments = Segments::of(self, &at.parameters);
         let total = self.sums(&at.parameters, &at.predicted, all, own, kept, &segments)?;

@@ -33,6 +33,17 @@ pub(super) struct SparseChunk {
     acts: Vec<bool>,
 }
 
+/// The numbers of some groups of so many directions each, which follow each other from the `first` on.
+pub(crate) fn in_a_row(first: usize, counts: impl IntoIterator<Item = usize>) -> Vec<Range<usize>> {
+    let mut end = first;
+    let numbers = |count: usize| {
+        let first = end;
+        end += count;
+        first..end
+    };
+    counts.into_iter().map(numbers).collect()
+}
+
 impl<'a> Sparse<'a> {
     /// So many columns, of which these act on the readings of any bins.
     pub(crate) fn of(columns: usize, acting: impl Fn(Range<usize>) -> Vec<Few> + Sync + 'a) -> Self {

@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use super::parameters::Parameters;
 use super::predictor::{Reached, Stream};
 use super::problem::Problem;
-use super::sparse::{Few, Sparse, SparseChunk};
+use super::sparse::{Few, Sparse, SparseChunk, in_a_row};
 use super::tiles::{Alone, Border, Crossed, Readings, Sums};
 use super::totals::{Kept, Segments, Total};
 use crate::data::DiscoverError;
@@ -228,17 +228,12 @@ impl Problem<'_> {
             }
         };
         let columns: Vec<Column> = values.into_iter().zip(running).map(column).collect();
-        let mut end = columns.len();
-        let first_of = |of: &Sparse<'_>| {
-            let first = end;
-            end += of.columns;
-            first
-        };
-        let firsts: Vec<usize> = sparse.iter().map(first_of).collect();
-        let groups: Vec<(usize, &Sparse<'_>)> = firsts.into_iter().zip(sparse).collect();
+        let numbers = in_a_row(columns.len(), sparse.iter().map(|of| of.columns));
+        let groups: Vec<_> = numbers.into_iter().zip(sparse).collect();
         let elements = self.predictor.bins.elements;
-        let sparse =
-            parallel::map(&groups, |(first, of)| SparseChunk::of(*first, of, range.clone(), elements));
+        let sparse = parallel::map(&groups, |(numbers, of)| {
+            SparseChunk::of(numbers.start, of, range.clone(), elements)
+        });
         Ok(Chunk { columns, sparse, bins: range, by_gain })
     }
 

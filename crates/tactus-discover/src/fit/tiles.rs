@@ -26,7 +26,7 @@ pub(super) struct Sums {
     pub(super) products: DMatrix<f64>,
     /// Those of each sparse column with itself.
     pub(super) squares: Vec<f64>,
-    /// That of those.
+    /// Products of all that are active with baselines and gains.
     pub(super) border: Border,
 }
 

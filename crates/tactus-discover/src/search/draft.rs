@@ -31,7 +31,7 @@ use super::grow::{ALPHA, FLIPS, Search};
 use super::not_shown::NotShown;
 use super::score::{Score, flipped, largest, p_value};
 use crate::data::DiscoverError;
-use crate::fit::{BLOCKS_MAX, FOLDS, Fitted, Free, Grams, Sparse, Term};
+use crate::fit::{BLOCKS_MAX, FOLDS, Fitted, Free, Grams, Sparse, Term, in_a_row};
 use crate::numbers::parallel;
 use crate::progress::Stage;
 
@@ -330,15 +330,9 @@ impl Search<'_> {
         count: f64,
     ) -> Result<Vec<(usize, f64)>, DiscoverError> {
         let mut found: Vec<(usize, f64)> = Vec::new();
-        while found.len() < atoms.len() {
+        for some in self.in_passes(atoms, sight) {
             let first = found.len();
-            let mut columns = 0;
-            let fits = |atom: &&Atom| {
-                columns += atom.columns(sight.elements);
-                columns <= self.columns_most()
-            };
-            let some = atoms[first..].iter().take_while(fits).count().max(1);
-            let (weighed, grams) = self.products(at, sight, atoms[first..first + some].to_vec())?;
+            let (weighed, grams) = self.products(at, sight, some.to_vec())?;
             let additions = additions(&weighed, &grams, count);
             let evidence = self.evidence_of(&additions, grams.reduced());
             found.extend(ranked(&evidence).into_iter().map(|(place, odds)| (first + place, odds)));
@@ -433,24 +427,11 @@ impl Search<'_> {
         atoms: &[Atom],
     ) -> Result<(f64, Vec<Atom>), DiscoverError> {
         let mut screened: Vec<Screened<'_>> = Vec::new();
-        let mut rest = atoms;
-        while !rest.is_empty() {
-            let mut count = 0;
-            let mut columns = Vec::new();
-            let mut of_atoms: Vec<(&Atom, Range<usize>)> = Vec::new();
-            for atom in rest {
-                let first = count;
-                let end = first + atom.columns(sight.elements);
-                if first > 0 && end > self.columns_most() {
-                    break;
-                }
-                columns.push(sight.columns(atom));
-                of_atoms.push((atom, first..end));
-                count = end;
-            }
-            rest = &rest[of_atoms.len()..];
+        for some in self.in_passes(atoms, sight) {
+            let columns: Vec<Sparse<'_>> = some.iter().map(|atom| sight.columns(atom)).collect();
+            let numbers = in_a_row(0, some.iter().map(|atom| atom.columns(sight.elements)));
             let grams = Arc::new(self.problem.grams_of_each(at, columns)?);
-            screened.extend(of_atoms.into_iter().map(|(atom, own)| Screened {
+            screened.extend(some.iter().zip(numbers).map(|(atom, own)| Screened {
                 atom,
                 own,
                 grams: Arc::clone(&grams),
@@ -490,6 +471,24 @@ impl Search<'_> {
         Ok((p_value(statistic, &under_none), first.collect()))
     }
 
+    /// Atoms in the passes that they take, in order: in each as many as there is memory for, and one at least.
+    fn in_passes<'a>(&self, atoms: &'a [Atom], sight: &Sight) -> Vec<&'a [Atom]> {
+        let most = self.columns_most();
+        let mut passes = Vec::new();
+        let mut rest = atoms;
+        while !rest.is_empty() {
+            let mut columns = 0;
+            let fits = |atom: &&Atom| {
+                columns += atom.columns(sight.elements);
+                columns <= most
+            };
+            let (some, others) = rest.split_at(rest.iter().take_while(fits).count().max(1));
+            passes.push(some);
+            rest = others;
+        }
+        passes
+    }
+
     /// Columns of a pass for which there is memory.
     fn parts_most(&self) -> usize {
         let bins = self.problem.predictor.bins;
@@ -522,13 +521,10 @@ impl Search<'_> {
         atoms: Vec<Atom>,
     ) -> Result<(Vec<Weighed>, Grams), DiscoverError> {
         let columns: Vec<Sparse<'_>> = atoms.iter().map(|atom| sight.columns(atom)).collect();
-        let mut end = 0;
-        let of_atom = |atom: Atom| {
-            let first = end;
-            end += atom.columns(sight.elements);
-            Weighed { atom, directions: (first..end).collect() }
-        };
-        Ok((atoms.into_iter().map(of_atom).collect(), self.problem.grams(at, columns)?))
+        let numbers = in_a_row(0, atoms.iter().map(|atom| atom.columns(sight.elements)));
+        let of_atom = |(atom, numbers): (Atom, Range<usize>)| Weighed { atom, directions: numbers.collect() };
+        let weighed = atoms.into_iter().zip(numbers).map(of_atom).collect();
+        Ok((weighed, self.problem.grams(at, columns)?))
     }
 
     fn evidence_of<'a>(&self, additions: &'a [Addition], products: &'a DMatrix<f64>) -> Evidence<'a> {
