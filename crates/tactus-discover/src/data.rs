@@ -1,6 +1,6 @@
 //! The data before any model: frames, where the tip rests and presses, bins of frames, the noise of a reading, faulty elements.
 //!
-//! Readings are averaged where the tip rests ([`bins`]). The mean of `n` consecutive readings with the autocorrelation `rho` has the
+//! Readings are averaged where the tip rests, or goes slowly straight on in contact ([`bins`]). The mean of `n` consecutive readings with the autocorrelation `rho` has the
 //! variance
 //!
 //! ```text
@@ -21,6 +21,7 @@
 //! |---|---|---|---|---|
 //! | bins.rs | `GROWTH` | `0.25` | tried | a bin is short where a relaxation is fast; 0.2 at first |
 //! | bins.rs | `FRAMES_MAX` | `15` | convention | half a second of the paper's sensor |
+//! | bins.rs | `REST_LEAST` | `3` | derived | two are on a straight line |
 //! | bins.rs | `BLOCK_S` | `3.0` | convention | long beside a correlation of the noise of some frames |
 //! | bins.rs | `STRETCH_S` | `10.0` | convention | as long as a press with its rest |
 //! | bins.rs | `HELDOUT_ONE_IN` | `3` | convention | a third judges, two thirds fit |
@@ -91,6 +92,9 @@
 //! | pace.rs | `DITHERED_STEPS` | `0.577` | derived | root of `1 / 4 + 1 / 12`; `e^-10` of what repeats is left |
 //! | pace.rs | `TOLERANCE` | `0.05` | convention | a rate of 60 Hz is never exact |
 //! | pace.rs | `USUAL` | `0.25` | convention | variances that differ by a quarter count as one |
+//! | slow_ways.rs | `DEPTH_PARTS` | `32.0` | convention | a curve over depth has fewer knots; the response hardly bends on so short a way |
+//! | slow_ways.rs | `SHOWS_Z` | `8.0` | derived | `1e-15` of a normal distribution lies beyond: none of all readings does by chance |
+//! | slow_ways.rs | `ZERO_FRAMES` | `15` | convention | half a second of the paper's sensor |
 //! | spectrum.rs | `STANDS_OUT` | `8.0` | tried | 6 at first; no recipe |
 //! | spectrum.rs | `RECORDINGS_PER_FALSE_LINE` | `50.0` | convention | one recording of noise in fifty (decision 0055) |
 //! | spectrum.rs | `PHASES_PER_COLUMN` | `2` | derived | so that no phase is more than a quarter of a turn, over all columns, from one looked at |
@@ -115,10 +119,11 @@ mod known;
 mod motion;
 mod noise;
 mod pace;
+mod slow_ways;
 pub(crate) mod spectrum;
 mod way;
 
-pub(crate) use bins::{Bins, HeldOut, presses};
+pub(crate) use bins::{Averaged, Bins, HeldOut, presses};
 pub(crate) use contacts::Contacts;
 pub(crate) use converter::{Converter, Fault, Gap, Rounding};
 pub use error::{DiscoverError, Mismatch, TooLittle};

@@ -48,7 +48,7 @@ mod rehearsals;
 use tactus_calibrate::FaultyElement;
 use tactus_model::effect::{Definition, EffectError, ParameterKind};
 
-use crate::data::{Bins, DiscoverError, Frames, HeldOut, Known, Noise};
+use crate::data::{Averaged, Bins, DiscoverError, Frames, HeldOut, Known, Noise};
 use crate::fit::{Direction, Free, Parameters, Predictor, Problem, Term};
 use crate::numbers::parallel;
 use crate::search::NotShown;
@@ -276,7 +276,7 @@ impl Planner<'_> {
         work: impl FnOnce(&Problem<'_>) -> Result<R, DiscoverError>,
     ) -> Result<R, DiscoverError> {
         let frames = &design.rehearsal.frames;
-        let mut bins = Bins::of(frames, true)?;
+        let mut bins = Bins::of(frames, Averaged::Rests)?;
         let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
         bins.weigh(frames, self.noise, &all);
         let predictor = Predictor::new(self.known, frames, &bins).read_as(self.frames);

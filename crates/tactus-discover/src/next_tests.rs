@@ -94,7 +94,7 @@ fn twins(known: &Known, [right, wrong]: [(&'static str, &[(&str, f64)]); 2]) -> 
     let [right, wrong] = [right, wrong].map(|(name, values)| explanation(known, name, values));
     let rehearsals = Rehearsals::of(planner(known, &frames, &noise, &rig));
     let frames = &rehearsals.designs(|one| one.name == "element-centres")[0].rehearsal.frames;
-    let mut bins = Bins::of(frames, true).unwrap();
+    let mut bins = Bins::of(frames, Averaged::Rests).unwrap();
     let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
     bins.weigh(frames, &noise, &all);
     bins.counts = Predictor::new(known, frames, &bins).predict(&right.parameters).unwrap();

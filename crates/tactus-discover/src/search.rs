@@ -79,7 +79,7 @@
 //! | grow.rs | `FLIPS` | `1999` | convention | gives p down to `5e-4` |
 //! | grow.rs | `ALPHA` | `0.005` | tried | 0.01 on the first day gave too many false alarms under coloured noise |
 //! | grow.rs | `NAMES_MAX` | `5` | cost | 4 at first |
-//! | grow.rs | `WORK_MOST` | `4_000_000_000` | cost | a minute or so: three of twenty sets reach it, which had not ended in 200 s (decision 0053) |
+//! | grow.rs | `WORK_MOST` | `3_000_000_000` | cost | half a minute or so; five of 42 sets reach it (decision 0068); 4,000 million at first (decision 0053) |
 //! | grow.rs | `FIRST_ROUNDS` | `2` | cost | of a fit |
 //! | grow.rs | `TRIAL_ROUNDS` | `6` | cost | of a fit; 7 and 5 at first |
 //! | grow.rs | `POLISH_ROUNDS` | `8` | cost | of a fit |

@@ -1,7 +1,7 @@
-//! Bins of frames: where the tip rests, consecutive frames are averaged into one bin.
+//! Bins of frames: where the tip rests, or goes slowly straight on in contact ([`super::slow_ways`]), consecutive frames are averaged into one bin.
 //!
-//! A frame in motion is a bin of its own. Once the tip rests, each bin holds more frames than the one before, up to half a
-//! second, so bins are short where relaxation is fast.
+//! Another frame in motion is a bin of its own. Once the tip rests, each bin holds more frames than the one before, up to half a
+//! second, so bins are short where relaxation is fast. So it is on a slow way, on which a bin reaches only so far, too.
 
 use tactus_model::Trajectory;
 
@@ -9,12 +9,15 @@ use super::error::{DiscoverError, Mismatch};
 use super::frames::Frames;
 use super::motion::{CLEAR_MM, interval_s, pressing, turns, unchanged};
 use super::noise::Noise;
+use super::slow_ways::SlowWays;
 use crate::numbers::Rng;
 
-/// Greatest number of frames in a bin, as a share of the frames since the tip came to rest.
+/// Greatest number of frames in a bin, as a share of the frames since the tip came to rest, or on its way.
 const GROWTH: f64 = 0.25;
 /// Greatest number of frames in a bin.
 const FRAMES_MAX: usize = 15;
+/// Least number of frames of a bin at rest, if it has several: what a mean loses of fewer nobody can tell ([`Bins::averaged_out`]).
+const REST_LEAST: usize = 3;
 /// Least duration of a block. Readings of different blocks are taken to be independent.
 const BLOCK_S: f64 = 3.0;
 /// Longest stretch of rest that is fitted or held out as a unit.
@@ -37,6 +40,8 @@ pub(crate) struct Bins {
     pub(crate) run: Vec<usize>,
     /// Mean time of the bin's frames since the run's first frame.
     pub(crate) t_s: Vec<f64>,
+    /// True for bins of several frames in which the tip moves.
+    pub(crate) moves: Vec<bool>,
     /// Mean counts, bin by bin; none of bins that are only predicted.
     pub(crate) counts: Vec<f64>,
     /// Inverse variance of a bin's mean for a noise of one count; 0 for bins that are ignored.
@@ -48,6 +53,17 @@ pub(crate) struct Bins {
     pub(crate) heldout: Vec<bool>,
     /// Path of the tip in each run.
     pub(crate) paths: Vec<Trajectory>,
+}
+
+/// Which frames bins hold several of.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Averaged<'a> {
+    /// None.
+    None,
+    /// Those in which the tip rests.
+    Rests,
+    /// These, and those in which it goes slowly straight on in a contact that readings with this noise show.
+    RestsAndSlowWays(&'a Noise),
 }
 
 /// The held-out part of the data.
@@ -62,9 +78,9 @@ pub(crate) struct HeldOut {
 }
 
 impl Bins {
-    /// Bins of several frames where the tip rests (`average`), or of one frame each; not weighted yet.
-    pub(crate) fn of(frames: &Frames, average: bool) -> Result<Self, DiscoverError> {
-        let mut bins = Self::divided(frames, average)?;
+    /// Bins of the frames; not weighted yet.
+    pub(crate) fn of(frames: &Frames, averaged: Averaged<'_>) -> Result<Self, DiscoverError> {
+        let mut bins = Self::divided(frames, averaged)?;
         bins.counts = vec![0.0; bins.len() * bins.elements];
         for (bin, sums) in bins.counts.chunks_exact_mut(bins.elements).enumerate() {
             let members = bins.first[bin]..bins.first[bin + 1];
@@ -80,34 +96,52 @@ impl Bins {
 
     /// Bins of one frame each to be predicted, without counts.
     pub(crate) fn of_frames(frames: &Frames) -> Result<Self, DiscoverError> {
-        Self::divided(frames, false)
+        Self::divided(frames, Averaged::None)
     }
 
-    fn divided(frames: &Frames, average: bool) -> Result<Self, DiscoverError> {
+    fn divided(frames: &Frames, averaged: Averaged<'_>) -> Result<Self, DiscoverError> {
         let unchanged = unchanged(frames, CLEAR_MM);
-        let (mut first, mut run, mut t_s) = (Vec::new(), Vec::new(), Vec::new());
+        let ways = match averaged {
+            Averaged::RestsAndSlowWays(noise) => SlowWays::of(frames, noise),
+            Averaged::None | Averaged::Rests => SlowWays::none(frames),
+        };
+        let (mut first, mut run, mut t_s, mut moves) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut begin = 0;
         let mut paths = Vec::new();
         for (index, (_, end)) in frames.runs.iter().enumerate() {
             paths.push(path(frames, begin, *end)?);
             let mut frame = begin;
             while frame < *end {
+                let is_way = ways.since(frame) > unchanged[frame];
+                let since = if is_way { ways.since(frame) } else { unchanged[frame] };
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
-                let most = if average {
-                    ((GROWTH * unchanged[frame] as f64) as usize).clamp(1, FRAMES_MAX)
-                } else {
-                    1
+                let most = match averaged {
+                    Averaged::None => 1,
+                    Averaged::Rests | Averaged::RestsAndSlowWays(_) => {
+                        ((GROWTH * since as f64) as usize).clamp(1, FRAMES_MAX)
+                    }
+                };
+                let goes_on = |next: usize| {
+                    if is_way {
+                        ways.reaches(frames, frame, next)
+                    } else {
+                        unchanged[next] > unchanged[next - 1]
+                    }
                 };
                 let mut next = frame + 1;
                 while next < *end
                     && next - frame < most
-                    && unchanged[next] > unchanged[next - 1]
+                    && goes_on(next)
                     && pressing(frames.phase[next]) == pressing(frames.phase[frame])
                 {
                     next += 1;
                 }
+                if !is_way && next - frame < REST_LEAST {
+                    next = frame + 1;
+                }
                 first.push(frame);
                 run.push(index);
+                moves.push(is_way && next - frame > 1);
                 let count = (next - frame) as f64;
                 t_s.push(frames.t_s[frame..next].iter().sum::<f64>() / count);
                 frame = next;
@@ -121,6 +155,7 @@ impl Bins {
             first,
             run,
             t_s,
+            moves,
             counts: Vec::new(),
             weight: vec![1.0; bins],
             block: vec![0; bins],
@@ -137,6 +172,50 @@ impl Bins {
     /// Number of frames in a bin.
     pub(crate) fn frames_in(&self, bin: usize) -> usize {
         self.first[bin + 1] - self.first[bin]
+    }
+
+    /// Where the tip was in the middle of a bin; robot frame.
+    pub(crate) fn position_mm(&self, frames: &Frames, bin: usize) -> [f64; 3] {
+        if self.moves[bin] {
+            self.paths[self.run[bin]].at(self.t_s[bin])
+        } else {
+            frames.position_mm[self.first[bin]]
+        }
+    }
+
+    /// By how much what was predicted of an element at a frame of a bin differs from what was predicted of the bin, per second: as from the bin before
+    /// to it, if the tip moves in it.
+    pub(crate) fn slope_per_s(&self, predicted: &[f64], bin: usize, element: usize) -> f64 {
+        if !self.moves[bin] {
+            return 0.0;
+        }
+        // The bin before is on the same way, because a bin has several frames only after some. After it the tip may do anything.
+        let before = bin - 1;
+        let of = |bin: usize| predicted[bin * self.elements + element];
+        (of(bin) - of(before)) / (self.t_s[bin] - self.t_s[before])
+    }
+
+    /// What the bins' means do not have of values of the frames: the departures from a straight line through those of a bin, frame by frame, element
+    /// by element. A slope is left to the means, because the next bin goes on with it.
+    pub(crate) fn averaged_out(&self, mut values: Vec<f64>) -> Vec<f64> {
+        for frames in self.first.windows(2) {
+            let (first, count) = (frames[0], (frames[1] - frames[0]) as f64);
+            let place = |frame: usize| (frame - first) as f64 - 0.5 * (count - 1.0);
+            let spread: f64 = (frames[0]..frames[1]).map(|frame| place(frame).powi(2)).sum();
+            for element in 0..self.elements {
+                let (mut sum, mut along) = (0.0, 0.0);
+                for frame in frames[0]..frames[1] {
+                    let value = values[frame * self.elements + element];
+                    sum += value;
+                    along += place(frame) * value;
+                }
+                let (mean, slope) = (sum / count, if spread > 0.0 { along / spread } else { 0.0 });
+                for frame in frames[0]..frames[1] {
+                    values[frame * self.elements + element] -= mean + slope * place(frame);
+                }
+            }
+        }
+        values
     }
 
     /// True if the tip was clear of the surface.

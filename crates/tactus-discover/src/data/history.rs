@@ -68,11 +68,11 @@ impl History {
             }
             next = bins.first[bin + 1];
             let frame = bins.first[bin];
-            let t_s = bins.t_s[bin];
+            let (t_s, [x_mm, y_mm, z_mm]) = (bins.t_s[bin], bins.position_mm(frames, bin));
             history.since_contact_s.push(t_s - state.contact_s);
             history.since_release_s.push(state.release_s.map_or(f64::NAN, |release_s| t_s - release_s));
             history.since_turn_s.push(t_s - state.turn_s);
-            history.depth_mm.push(state.depth_mm);
+            history.depth_mm.push(if bins.moves[bin] { -z_mm } else { state.depth_mm });
             history.deepest_before_mm.push(state.deepest_before_mm);
             history.upward.push(f64::from(u8::from(state.upward)));
             history.speed_mm_per_s.push(state.speed_mm_per_s);
@@ -81,8 +81,8 @@ impl History {
             history.aside[1].push(state.aside[1]);
             history.heading.push(state.heading);
             history.press.push(state.presses);
-            history.place_mm[0].push(frames.position_mm[frame][0]);
-            history.place_mm[1].push(frames.position_mm[frame][1]);
+            history.place_mm[0].push(x_mm);
+            history.place_mm[1].push(y_mm);
             history.last_place_mm.push(state.last_place_mm.filter(|_| state.depth_mm <= 0.0));
             history.temperature_c.push(f64::from(frames.temperature_c[frame]));
         }

@@ -8,7 +8,7 @@ use super::frames::Frames;
 use crate::numbers::{NORMAL_PER_MEDIAN, median};
 
 /// A smaller movement counts as none, unless positions jitter by more.
-const STILL_MM: f64 = 0.001;
+pub(super) const STILL_MM: f64 = 0.001;
 /// What a step from frame to frame means is one over this time where frames are nearer to each other: that of the paper's sensor.
 pub(super) const STRIDE_S: f64 = 1.0 / 30.0;
 /// An interval that is longer than so many usual ones is a pause.

@@ -4,7 +4,7 @@ use rand_distr::{Distribution, StandardNormal};
 use tactus_schema::table::{Phase, RowView};
 
 use super::{STILL_MM, load_speed_mm_per_s, load_speeds_mm_per_s, still, still_mm, turns};
-use crate::data::bins::Bins;
+use crate::data::bins::{Averaged, Bins};
 use crate::data::{Contacts, History, Noise};
 use crate::{Floor, Frames};
 
@@ -74,7 +74,7 @@ fn what_depends_on_rests_does_not_depend_on_a_jitter() {
         let (noise, floor) = Noise::measured(frames, &still(frames), 0.0);
         assert!(matches!(floor, Floor::Time { .. }), "{floor:?}");
         assert!((noise.rms_counts - 2.0).abs() < 0.2, "{}", noise.rms_counts);
-        let history = History::of(frames, &Bins::of(frames, false).unwrap());
+        let history = History::of(frames, &Bins::of(frames, Averaged::None).unwrap());
         let last_held = FRAMES_EACH + 99;
         assert!((history.since_turn_s[last_held] - 2.0).abs() < 0.1, "{}", history.since_turn_s[last_held]);
         assert!(history.upward[last_held] < 0.5 && history.upward[last_held + 5] > 0.5);
@@ -148,7 +148,7 @@ fn what_moves_slowly_moves_at_any_rate() {
         assert!(load_speed_mm_per_s(&frames).is_some(), "{rate_hz}");
         let contacts = Contacts::of(&frames);
         assert!(contacts.falls_in_contact() && contacts.distinct_depths() == 1, "{rate_hz} {fall_mm_per_s}");
-        let history = History::of(&frames, &Bins::of(&frames, false).unwrap());
+        let history = History::of(&frames, &Bins::of(&frames, Averaged::None).unwrap());
         let at = |t_s: f64| whole(t_s * rate_hz);
         for (t_s, upward, since_s) in [(below_s + 0.8, 0.0, 0.8), (below_s + 1.8, 1.0, 0.8)] {
             let frame = at(t_s);

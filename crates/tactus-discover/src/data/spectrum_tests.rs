@@ -7,6 +7,7 @@ use tactus_schema::table::{Phase, RowView};
 
 use super::{Line, lines, lines_in_contact, transform};
 use crate::data::Frames;
+use crate::data::bins::{Averaged, Bins};
 
 const ELEMENTS: usize = 16;
 const COLUMNS: usize = 4;
@@ -167,4 +168,27 @@ fn the_transform_is_the_sum_that_defines_it() {
         }
         assert!((re - want_re).abs() < 1e-9 && (im - want_im).abs() < 1e-9, "{frequency}");
     }
+}
+
+/// What recovers after each press leaks through the gaps that presses make, to all frequencies.
+#[test]
+fn what_recovers_after_presses_has_no_tone_that_averages_lose() {
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    let lengths: Vec<usize> = (0..140).map(|_| rng.random_range(20..60)).collect();
+    let frames = pressed(lengths.iter().copied());
+    let mut since_s: Vec<f64> = Vec::new();
+    for count in &lengths {
+        since_s.extend((0..*count).map(|frame| frame as f64 / RATE_HZ));
+    }
+    let bins = Bins::of(&frames, Averaged::Rests).unwrap();
+    let recovers = |t_s: f64, element: usize| {
+        let since_s = since_s[frame_at(t_s)];
+        20.0 * (1.0 + (element as f64).sin()) * (-since_s / 0.4).exp()
+    };
+    let all = residual(&frames, &mut rng, recovers);
+    assert!(!lines(&frames, COLUMNS, &all).is_empty(), "these are no tones");
+    assert_eq!(lines(&frames, COLUMNS, &bins.averaged_out(all)), []);
+    let hums = |t_s: f64, element: usize| recovers(t_s, element) + 0.7 * (TAU * 4.3 * t_s).sin();
+    let found = lines(&frames, COLUMNS, &bins.averaged_out(residual(&frames, &mut rng, hums)));
+    assert!(found.first().is_some_and(|line| (line.frequency_hz - 4.3).abs() < 0.01), "{found:?}");
 }

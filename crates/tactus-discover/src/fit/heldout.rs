@@ -87,17 +87,22 @@ impl Problem<'_> {
         (squares > 0.0).then(|| [share, scatter.sqrt() / squares])
     }
 
-    /// Root mean square of the residuals of the elements with weight in the held-out frames, each predicted as its bin is.
+    /// Root mean square of the residuals of the elements with weight in the held-out frames, each predicted as its bin is, or
+    /// along the way of its bin.
     pub(crate) fn heldout_rms_counts(&self, predicted: &[f64]) -> f64 {
         let (bins, frames) = (self.predictor.bins, self.predictor.frames);
         let (mut sum, mut readings) = (0.0, 0.0);
-        let of_bins = predicted.chunks_exact(bins.elements).enumerate();
-        for (bin, predicted) in of_bins.filter(|(bin, _)| bins.heldout[*bin]) {
+        for bin in (0..bins.len()).filter(|bin| bins.heldout[*bin]) {
+            let weighed = (0..bins.elements).filter(|element| self.element_weight[*element] > 0.0);
+            let weighed: Vec<(usize, f64)> =
+                weighed.map(|element| (element, bins.slope_per_s(predicted, bin, element))).collect();
             for frame in bins.first[bin]..bins.first[bin + 1] {
-                let readings_of = frames.counts_of(frame).iter().zip(predicted).zip(&self.element_weight);
-                let weighed = readings_of.filter(|(_, weight)| **weight > 0.0);
-                sum += weighed.map(|((counts, of), _)| (f64::from(*counts) - of).powi(2)).sum::<f64>();
-                readings += self.weighed_elements();
+                let (counts, after_s) = (frames.counts_of(frame), frames.t_s[frame] - bins.t_s[bin]);
+                let residual = |(element, slope): &(usize, f64)| {
+                    f64::from(counts[*element]) - predicted[bin * bins.elements + element] - slope * after_s
+                };
+                sum += weighed.iter().map(|one| residual(one).powi(2)).sum::<f64>();
+                readings += weighed.len() as f64;
             }
         }
         if readings > 0.0 { (sum / readings).sqrt() } else { 0.0 }

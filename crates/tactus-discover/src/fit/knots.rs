@@ -219,8 +219,7 @@ impl Problem<'_> {
     pub(crate) fn weights_at(&self, table: &Table) -> Vec<Vec<f64>> {
         let (bins, frames) = (self.predictor.bins, self.predictor.frames);
         let registration = &self.predictor.known.registration;
-        let place =
-            |bin: usize| place(table.by, bins.t_s[bin], &frames.position_mm[bins.first[bin]], registration);
+        let place = |bin: usize| place(table.by, bins.t_s[bin], &bins.position_mm(frames, bin), registration);
         let places: Vec<f64> = (0..bins.len()).map(place).collect();
         let weights = |knot| {
             let hat = Hat::of(&table.at, knot);

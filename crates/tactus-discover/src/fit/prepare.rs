@@ -8,8 +8,8 @@ use super::parameters::{Parameters, Term};
 use super::predictor::{Predictor, no_images};
 use super::problem::{Fitted, Problem};
 use crate::data::{
-    Bins, Converter, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Line, Noise, Rounding, TooLittle,
-    spectrum, still,
+    Averaged, Bins, Converter, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Line, Noise, Rounding,
+    TooLittle, spectrum, still,
 };
 
 /// Least number of fitted presses.
@@ -102,18 +102,26 @@ impl<'a> Prepared<'a> {
         let floor = floor.with_rms(noise.rms_counts);
 
         let whole = Bins::of_frames(frames)?;
-        let mut bins = Bins::of(frames, true)?;
+        // What coarse steps do to a mean depends on how many of them the way crosses.
+        let rounds = converter.as_ref().is_some_and(Converter::rounds);
+        let averaged = if rounds { Averaged::Rests } else { Averaged::RestsAndSlowWays(&noise) };
+        let mut bins = Bins::of(frames, averaged)?;
         bins.weigh(frames, &noise, &heldout);
         let images = no_images(frames.elements);
         let base_of = |bins: &Bins| {
             recalibrated(&Problem::new(Predictor::with_images(known, frames, bins, &images), &noise), &faulty)
         };
         let mut base = base_of(&bins)?;
-        let (lines, has_lines_in_contact) =
-            lines(&Predictor::with_images(known, frames, &whole, &images), &base, &faulty)?;
-        if !lines.is_empty() || has_lines_in_contact {
-            // Averaging over several frames would remove a tone.
-            bins = Bins::of(frames, false)?;
+        let residual =
+            residual_of_frames(&Predictor::with_images(known, frames, &whole, &images), &base, &faulty)?;
+        let columns = known.array.cols();
+        let lines = spectrum::lines(frames, columns, &residual);
+        let averaged_out = bins.averaged_out(residual);
+        let has_tone = !spectrum::lines(frames, columns, &averaged_out).is_empty()
+            || !spectrum::lines_in_contact(frames, columns, &averaged_out).is_empty();
+        if has_tone {
+            // Averaging over several frames would remove it.
+            bins = Bins::of(frames, Averaged::None)?;
             bins.weigh(frames, &noise, &heldout);
             base = base_of(&bins)?;
         }
@@ -186,16 +194,17 @@ fn recalibrated(problem: &Problem<'_>, faulty: &Faulty) -> Result<Fitted, Discov
     problem.fit_from(start, BASE_ROUNDS)
 }
 
-/// Lines in the spectrum of a model's residual of the frames without contact, and whether those in which the tip rests in contact have any.
-fn lines(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<(Vec<Line>, bool), DiscoverError> {
+/// A model's residual, frame by frame, element by element; 0 for faulty elements.
+fn residual_of_frames(
+    whole: &Predictor<'_>,
+    base: &Fitted,
+    faulty: &Faulty,
+) -> Result<Vec<f64>, DiscoverError> {
     let predicted = whole.predict(&base.parameters)?;
     let mut residual: Vec<f64> =
         whole.frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
     for element in (0..whole.frames.elements).filter(|element| faulty.is_weightless(*element)) {
         residual.iter_mut().skip(element).step_by(whole.frames.elements).for_each(|residual| *residual = 0.0);
     }
-    let columns = whole.known.array.cols();
-    let without_contact = spectrum::lines(whole.frames, columns, &residual);
-    let in_contact = spectrum::lines_in_contact(whole.frames, columns, &residual);
-    Ok((without_contact, !in_contact.is_empty()))
+    Ok(residual)
 }

@@ -63,7 +63,7 @@ pub const ALPHA: f64 = 0.005;
 /// Greatest number of added effects.
 pub(crate) const NAMES_MAX: usize = 5;
 /// Work after which a search takes no further class and exchanges none, in predicted readings ([`Predictor::work`](crate::fit::Predictor::work)).
-pub(crate) const WORK_MOST: u64 = 4_000_000_000;
+pub(crate) const WORK_MOST: u64 = 3_000_000_000;
 /// Rounds of a fit that compares candidates: of all, and of the best.
 const FIRST_ROUNDS: usize = 2;
 pub(super) const TRIAL_ROUNDS: usize = 6;

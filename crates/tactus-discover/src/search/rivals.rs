@@ -285,13 +285,18 @@ impl Seen {
             way_mm += (0..3).map(|axis| (position_mm[axis] - from_mm[axis]).powi(2)).sum::<f64>().sqrt();
             ways_mm.extend(frame.map(|_| way_mm));
         }
+        // Where the tip rests it goes no way.
+        let way_of = |bin: usize| {
+            let (first, end) = (bins.first[bin], bins.first[bin + 1]);
+            if bins.moves[bin] { 0.5 * (ways_mm[first] + ways_mm[end - 1]) } else { ways_mm[first] }
+        };
         Ok(Self {
             elements,
             centres_mm: (0..elements).filter_map(|element| known.array.centre_mm(element)).collect(),
             deep: history.depth_mm.iter().map(|depth_mm| *depth_mm > 0.0).collect(),
             place_mm: places.map(|(x, y)| known.registration.to_sensor([*x, *y])).collect(),
             heading: history.heading.iter().map(|heading| turned(*heading)).collect(),
-            travel_mm: bins.first[..bins.len()].iter().map(|frame| ways_mm[*frame]).collect(),
+            travel_mm: (0..bins.len()).map(way_of).collect(),
             largest: forms.signal().chunks_exact(elements).map(largest).collect(),
             forms,
         })

@@ -11,7 +11,7 @@
 //!
 //! is 0 in the mean if the scatter is always the same. Blocks are independent, and the cube root of a mean square is nearly normal, so the signs
 //! of the blocks' parts are flipped. At rest departures are those of a bin's frames from the straight line through them, which needs no model; in
-//! motion a bin is one frame, and its departure the residual.
+//! motion a bin has one, its residual times the root of the number of its frames, and `q` and `v` are taken from the means over bins of as many.
 //!
 //! Where the noise is smaller than the converter's step, its scatter depends on where between two codes a reading lies. Then nothing is tested.
 //!
@@ -75,6 +75,8 @@ impl With {
 #[derive(Debug, Clone, Copy)]
 struct Departures {
     bin: usize,
+    /// Of how many frames the bin is.
+    frames: usize,
     /// How many independent ones there are.
     count: usize,
     /// Cube root of their mean square.
@@ -124,8 +126,8 @@ impl Search<'_> {
             |bin: usize| are_usual[bins.first[bin]..bins.first[bin + 1]].iter().all(|usual| *usual);
         for element in (0..bins.elements).filter(|element| self.problem.element_weight[*element] > 0.0) {
             let mut departures = self.departures(at, forms, with, &is_usual, element);
-            departures.sort_by_key(|of| of.count);
-            for alike in departures.chunk_by(|one, next| one.count == next.count) {
+            departures.sort_by_key(|of| of.frames);
+            for alike in departures.chunk_by(|one, next| one.frames == next.frames) {
                 let mean =
                     |of: fn(&Departures) -> f64| alike.iter().map(of).sum::<f64>() / alike.len() as f64;
                 let (size, value) = (mean(|of| of.size), mean(|of| of.value));
@@ -152,13 +154,13 @@ impl Search<'_> {
         let mut departures = Vec::new();
         for bin in (0..bins.len()).filter(|bin| problem.train[*bin] > 0.0 && is_usual(*bin)) {
             let reading = bin * elements + element;
-            let count = bins.frames_in(bin);
-            let (square, count) = if with.at_rest() && count >= REST_FRAMES {
+            let (in_bin, rests) = (bins.frames_in(bin), !bins.moves[bin]);
+            let (square, count) = if with.at_rest() && rests && in_bin >= REST_FRAMES {
                 let counts = (bins.first[bin]..bins.first[bin + 1])
                     .map(|frame| f64::from(frames.counts[frame * elements + element]));
-                (from_line(counts), count - 2)
-            } else if !with.at_rest() && count == 1 {
-                ((bins.counts[reading] - at.predicted[reading]).powi(2), 1)
+                (from_line(counts), in_bin - 2)
+            } else if !with.at_rest() && (in_bin == 1 || !rests) {
+                (in_bin as f64 * (bins.counts[reading] - at.predicted[reading]).powi(2), 1)
             } else {
                 continue;
             };
@@ -176,7 +178,13 @@ impl Search<'_> {
                         .powi(2)
                 }
             };
-            departures.push(Departures { bin, count, size: (square / count as f64).cbrt(), value });
+            departures.push(Departures {
+                bin,
+                frames: in_bin,
+                count,
+                size: (square / count as f64).cbrt(),
+                value,
+            });
         }
         departures
     }
