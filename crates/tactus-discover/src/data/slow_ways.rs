@@ -3,6 +3,8 @@
 //! The mean of readings along a straight way is the reading at its middle, but for how much the response bends on it. It bends most where the
 //! tip touches the covering, and nobody knows exactly where that is. So a way begins below the surface, once the readings show the contact.
 
+use std::ops::Range;
+
 use super::frames::Frames;
 use super::motion::{STILL_MM, pressing, still_mm};
 use super::noise::Noise;
@@ -105,34 +107,42 @@ fn deepest_mm(frames: &Frames) -> Vec<f64> {
 
 /// For every frame, whether the tip is below the surface and its readings show a contact.
 fn shows(frames: &Frames, noise: &Noise) -> Vec<bool> {
-    let mut shows = vec![false; frames.len()];
-    let mut begin = 0;
+    let mut shows = Vec::with_capacity(frames.len());
     for (_, end) in &frames.runs {
-        let mut before = begin..begin;
+        let mut before = shows.len()..shows.len();
         let mut zeros: Vec<f64> = Vec::new();
-        for frame in begin..*end {
+        for frame in shows.len()..*end {
             if !pressing(frames.phase[frame]) {
                 let is_next = before.end == frame && !frames.is_after_gap(frame);
                 let first = if is_next { before.start } else { frame };
                 before = first.max((frame + 1).saturating_sub(ZERO_FRAMES))..frame + 1;
                 zeros.clear();
+                shows.push(false);
                 continue;
             }
             if zeros.is_empty() && !before.is_empty() {
-                zeros = vec![0.0; frames.elements];
-                for one in before.clone() {
-                    for (zero, counts) in zeros.iter_mut().zip(frames.counts_of(one)) {
-                        *zero += f64::from(*counts) / before.len() as f64;
-                    }
-                }
+                zeros = mean_counts(frames, before.clone());
             }
             let mut readings = frames.counts_of(frame).iter().zip(&zeros).zip(&noise.by_element_counts);
-            shows[frame] = frames.position_mm[frame][2] < 0.0
-                && readings.any(|((counts, zero), rms)| (f64::from(*counts) - zero).abs() > SHOWS_Z * rms);
+            let is_off = |((counts, zero), rms): ((&f32, &f64), &f64)| {
+                (f64::from(*counts) - zero).abs() > SHOWS_Z * rms
+            };
+            shows.push(frames.position_mm[frame][2] < 0.0 && readings.any(is_off));
         }
-        begin = *end;
     }
     shows
+}
+
+/// The mean of each element's readings over some frames.
+fn mean_counts(frames: &Frames, among: Range<usize>) -> Vec<f64> {
+    let mut means = vec![0.0; frames.elements];
+    let count = among.len() as f64;
+    for frame in among {
+        for (mean, counts) in means.iter_mut().zip(frames.counts_of(frame)) {
+            *mean += f64::from(*counts) / count;
+        }
+    }
+    means
 }
 
 #[cfg(test)]
