@@ -1,7 +1,7 @@
 //! The data before any model: frames, where the tip rests and presses, bins of frames, the noise of a reading, faulty elements.
 //!
-//! Readings are averaged where the tip rests, or goes slowly straight on in contact ([`bins`]). The mean of `n` consecutive readings with the autocorrelation `rho` has the
-//! variance
+//! Readings are averaged where the tip rests, or goes slowly straight on in contact ([`bins`]). The mean of `n` consecutive readings with the
+//! autocorrelation `rho` has the variance
 //!
 //! ```text
 //! noise^2 / n (1 + 2 sum over k of (1 - k / n) rho(k))

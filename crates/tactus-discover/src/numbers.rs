@@ -8,8 +8,10 @@ mod normal;
 pub(crate) mod parallel;
 mod quantiles;
 mod rng;
+mod straight_line;
 
 pub(crate) use median::{NORMAL_PER_MEDIAN, median};
 pub(crate) use normal::{of_picked, upper_tail};
 pub(crate) use quantiles::{Z_95, student_95};
 pub(crate) use rng::Rng;
+pub(crate) use straight_line::StraightLine;

@@ -10,7 +10,7 @@ use super::frames::Frames;
 use super::motion::{CLEAR_MM, interval_s, pressing, turns, unchanged};
 use super::noise::Noise;
 use super::slow_ways::SlowWays;
-use crate::numbers::Rng;
+use crate::numbers::{Rng, StraightLine};
 
 /// Greatest number of frames in a bin, as a share of the frames since the tip came to rest, or on its way.
 const GROWTH: f64 = 0.25;
@@ -81,16 +81,7 @@ impl Bins {
     /// Bins of the frames; not weighted yet.
     pub(crate) fn of(frames: &Frames, averaged: Averaged<'_>) -> Result<Self, DiscoverError> {
         let mut bins = Self::divided(frames, averaged)?;
-        bins.counts = vec![0.0; bins.len() * bins.elements];
-        for (bin, sums) in bins.counts.chunks_exact_mut(bins.elements).enumerate() {
-            let members = bins.first[bin]..bins.first[bin + 1];
-            let count = members.len() as f64;
-            for member in members {
-                for (sum, one) in sums.iter_mut().zip(frames.counts_of(member)) {
-                    *sum += f64::from(*one) / count;
-                }
-            }
-        }
+        bins.counts = bins.first.windows(2).flat_map(|of| frames.mean_counts(of[0]..of[1])).collect();
         Ok(bins)
     }
 
@@ -198,20 +189,13 @@ impl Bins {
     /// What the bins' means do not have of values of the frames: the departures from a straight line through those of a bin, frame by frame, element
     /// by element. A slope is left to the means, because the next bin goes on with it.
     pub(crate) fn averaged_out(&self, mut values: Vec<f64>) -> Vec<f64> {
-        for frames in self.first.windows(2) {
-            let (first, count) = (frames[0], (frames[1] - frames[0]) as f64);
-            let place = |frame: usize| (frame - first) as f64 - 0.5 * (count - 1.0);
-            let spread: f64 = (frames[0]..frames[1]).map(|frame| place(frame).powi(2)).sum();
-            for element in 0..self.elements {
-                let (mut sum, mut along) = (0.0, 0.0);
-                for frame in frames[0]..frames[1] {
-                    let value = values[frame * self.elements + element];
-                    sum += value;
-                    along += place(frame) * value;
-                }
-                let (mean, slope) = (sum / count, if spread > 0.0 { along / spread } else { 0.0 });
-                for frame in frames[0]..frames[1] {
-                    values[frame * self.elements + element] -= mean + slope * place(frame);
+        let elements = self.elements;
+        for of_bin in self.first.windows(2).map(|frames| frames[0]..frames[1]) {
+            for element in 0..elements {
+                let reading = |frame: usize| frame * elements + element;
+                let line = StraightLine::through(of_bin.clone().map(|frame| values[reading(frame)]));
+                for (place, frame) in of_bin.clone().enumerate() {
+                    values[reading(frame)] -= line.at(place);
                 }
             }
         }
@@ -309,16 +293,16 @@ pub(crate) fn presses(frames: &Frames) -> usize {
 }
 
 /// Frames of a press and of the rest after it, up to the next press or [`STRETCH_S`].
-struct PressSpan {
+pub(super) struct PressSpan {
     run: usize,
-    first: usize,
-    end: usize,
-    depth_mm: f64,
+    pub(super) first: usize,
+    pub(super) end: usize,
+    pub(super) depth_mm: f64,
     covering_mm: f64,
 }
 
 impl PressSpan {
-    fn of(frames: &Frames) -> Vec<Self> {
+    pub(super) fn of(frames: &Frames) -> Vec<Self> {
         let mut presses: Vec<Self> = Vec::new();
         let mut begin = 0;
         for (run, (_, run_end)) in frames.runs.iter().enumerate() {

@@ -190,4 +190,16 @@ impl Frames {
     pub(crate) fn counts_of(&self, frame: usize) -> &[f32] {
         &self.counts[frame * self.elements..(frame + 1) * self.elements]
     }
+
+    /// The mean of each element's counts over some frames.
+    pub(super) fn mean_counts(&self, among: Range<usize>) -> Vec<f64> {
+        let mut means = vec![0.0; self.elements];
+        let count = among.len() as f64;
+        for frame in among {
+            for (mean, counts) in means.iter_mut().zip(self.counts_of(frame)) {
+                *mean += f64::from(*counts) / count;
+            }
+        }
+        means
+    }
 }

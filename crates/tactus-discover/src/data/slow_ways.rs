@@ -3,8 +3,7 @@
 //! The mean of readings along a straight way is the reading at its middle, but for how much the response bends on it. It bends most where the
 //! tip touches the covering, and nobody knows exactly where that is. So a way begins below the surface, once the readings show the contact.
 
-use std::ops::Range;
-
+use super::bins::PressSpan;
 use super::frames::Frames;
 use super::motion::{STILL_MM, pressing, still_mm};
 use super::noise::Noise;
@@ -47,7 +46,11 @@ impl SlowWays {
             }
             begin = *end;
         }
-        Self { since, most_mm: deepest_mm(frames).into_iter().map(|mm| mm / DEPTH_PARTS).collect() }
+        let mut most_mm = vec![0.0; frames.len()];
+        for press in PressSpan::of(frames) {
+            most_mm[press.first..press.end].fill(press.depth_mm / DEPTH_PARTS);
+        }
+        Self { since, most_mm }
     }
 
     /// The number of frames directly before this one on the same way.
@@ -90,21 +93,6 @@ fn goes_on(frames: &Frames, [a, b, c]: [usize; 3]) -> bool {
     is_next && is_even && moves(a, b) && moves(b, c)
 }
 
-/// For every frame, the greatest depth of its press; none of frames without one.
-fn deepest_mm(frames: &Frames) -> Vec<f64> {
-    let mut deepest_mm = Vec::with_capacity(frames.len());
-    for (_, end) in &frames.runs {
-        let begin = deepest_mm.len();
-        for press in frames.press[begin..*end].chunk_by(|one, next| one == next) {
-            let of_press = deepest_mm.len()..deepest_mm.len() + press.len();
-            let depths_mm = frames.position_mm[of_press].iter().map(|at| -at[2]);
-            let most_mm = if press[0] < 0 { 0.0 } else { depths_mm.fold(0.0, f64::max) };
-            deepest_mm.extend(std::iter::repeat_n(most_mm, press.len()));
-        }
-    }
-    deepest_mm
-}
-
 /// For every frame, whether the tip is below the surface and its readings show a contact.
 fn shows(frames: &Frames, noise: &Noise) -> Vec<bool> {
     let mut shows = Vec::with_capacity(frames.len());
@@ -121,7 +109,7 @@ fn shows(frames: &Frames, noise: &Noise) -> Vec<bool> {
                 continue;
             }
             if zeros.is_empty() && !before.is_empty() {
-                zeros = mean_counts(frames, before.clone());
+                zeros = frames.mean_counts(before.clone());
             }
             let mut readings = frames.counts_of(frame).iter().zip(&zeros).zip(&noise.by_element_counts);
             let is_off = |((counts, zero), rms): ((&f32, &f64), &f64)| {
@@ -131,18 +119,6 @@ fn shows(frames: &Frames, noise: &Noise) -> Vec<bool> {
         }
     }
     shows
-}
-
-/// The mean of each element's readings over some frames.
-fn mean_counts(frames: &Frames, among: Range<usize>) -> Vec<f64> {
-    let mut means = vec![0.0; frames.elements];
-    let count = among.len() as f64;
-    for frame in among {
-        for (mean, counts) in means.iter_mut().zip(frames.counts_of(frame)) {
-            *mean += f64::from(*counts) / count;
-        }
-    }
-    means
 }
 
 #[cfg(test)]

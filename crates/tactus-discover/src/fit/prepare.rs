@@ -69,7 +69,8 @@ impl<'a> Prepared<'a> {
         let step_counts = converter.as_ref().map_or(declared_counts, |one| one.step_counts(declared_counts));
         let step_counts = frames.step_of_means(step_counts);
         let (mut noise, floor) = Noise::measured(frames, &still, step_counts);
-        if converter.as_ref().is_some_and(Converter::rounds) {
+        let rounds = converter.as_ref().is_some_and(Converter::rounds);
+        if rounds {
             // Steps so coarse round small signals the same way in every press.
             noise.repeated_frames = f64::INFINITY;
         }
@@ -103,7 +104,6 @@ impl<'a> Prepared<'a> {
 
         let whole = Bins::of_frames(frames)?;
         // What coarse steps do to a mean depends on how many of them the way crosses.
-        let rounds = converter.as_ref().is_some_and(Converter::rounds);
         let averaged = if rounds { Averaged::Rests } else { Averaged::RestsAndSlowWays(&noise) };
         let mut bins = Bins::of(frames, averaged)?;
         bins.weigh(frames, &noise, &heldout);

@@ -24,7 +24,7 @@ use super::grow::Search;
 use super::score::sign_flip_p;
 use crate::data::DiscoverError;
 use crate::fit::Fitted;
-use crate::numbers::{median, parallel};
+use crate::numbers::{StraightLine, median, parallel};
 
 /// Least number of frames of a bin at rest; a line through them takes two.
 const REST_FRAMES: usize = 3;
@@ -192,17 +192,8 @@ impl Search<'_> {
 
 /// The sum of squared departures of values from a straight line through them.
 fn from_line(values: impl Iterator<Item = f64> + Clone) -> f64 {
-    let count = values.clone().count() as f64;
-    let mean = values.clone().sum::<f64>() / count;
-    let middle = 0.5 * (count - 1.0);
-    let places = (0..).map(|place| f64::from(place) - middle);
-    let (mut square, mut along, mut spread) = (0.0, 0.0, 0.0);
-    for (value, place) in values.zip(places) {
-        square += (value - mean).powi(2);
-        along += (value - mean) * place;
-        spread += place * place;
-    }
-    if spread > 0.0 { square - along * along / spread } else { square }
+    let line = StraightLine::through(values.clone());
+    values.enumerate().map(|(place, value)| (value - line.at(place)).powi(2)).sum()
 }
 
 #[cfg(test)]
